@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from nearfar.arrays import Size
-from nearfar.estimate.joint import estimate_jointly
+from nearfar.estimate.joint import estimate_jointly, evidence
 from nearfar.estimate.joint.evidence import (
     best_between_scales,
     best_of,
@@ -65,6 +65,24 @@ def test_the_evidence_is_that_of_dense_algebra(offset):
     spread = expected.max(axis=1) - expected.min(axis=1)
     assert np.abs(difference).max(axis=1) == pytest.approx(0, abs=0.02 * spread.max() + 1.0)
     assert np.array_equal(found.argmax(axis=1), expected.argmax(axis=1))
+
+
+@pytest.mark.parametrize("offset", [0.0, 1e-2])
+def test_sums_by_a_compiled_loop_are_those_of_products_with_tables(offset, monkeypatch):
+    """Arrays of an accelerator have the latter."""
+    centres = np.array([[8, 10], [7, 9], [6, 12], [8, 11], [5, 5]])
+    frequencies = chosen_frequencies()
+    centred = centred_on_all(frequencies)
+    rows, _ = drawn_rows(len(centres), centres, 0.02)
+    # Rows of two tables, one of them of several rows.
+    rows[2:] *= 3.0
+    measurements = measured(rows, frequencies, noise=2e-3, offset=offset)
+    whitened = whiten(batch_of(measurements, centres, centred))
+    assert 1 < len(np.unique(whitened.table_step)) < len(whitened.table_step)
+    prior = response_prior(COMPONENT, centred, measurements.multiplicity[centred.response_indices])
+    by_loop = log_evidence(whitened, prior)
+    monkeypatch.setattr(evidence, "is_numpy_array", lambda _array: False)
+    np.testing.assert_allclose(log_evidence(whitened, prior), by_loop, rtol=1e-11)
 
 
 def test_a_camera_pixel_chooses_the_prior_component_that_it_was_drawn_from():

@@ -20,11 +20,11 @@ from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
-from array_api_compat import device
+from array_api_compat import device, is_numpy_array
 
 from nearfar.arrays import Floats, Integers, beside, fetch, namespace, product_by_row
 from nearfar.estimate.joint.batch import PixelBatch
-from nearfar.estimate.joint.evidence_sums import sum_squares
+from nearfar.estimate.joint.evidence_sums import put_weighted_sums, sum_squares
 from nearfar.estimate.joint.nuisance import DIRECT_PRIOR_DEVIATION
 from nearfar.illumination.centred_basis import CentredBasis
 from nearfar.priors.fitted import PRIOR_SCALES
@@ -337,32 +337,62 @@ def _double_product(rows: Floats, matrix: Floats) -> Floats:
 def _weighted_sums(
     whitened: WhitenedResponses, projected: tuple[Floats, Floats, Floats], eigenbasis: Eigenbasis
 ) -> tuple[list[Floats], Floats]:
-    """Return weighted sums of products, by products with each table, and log determinants.
+    """Return weighted sums of products, and log determinants.
 
     Of y, light u of q and errors v of the references, the sums are yy, uy and uu, and where there
-    are such errors vy, vu and vv; each (m, scales).
+    are such errors vy, vu and vv; each (m, scales). A compiled loop sums NumPy arrays row by row;
+    on other devices they are products with the table of each row.
     """
     y, u, v = projected
     xp, table_step = namespace(y), fetch(whitened.table_step)
-    count, shape = 6 if len(v) else 3, (len(y), len(PRIOR_SCALES))
-    sums = [xp.empty(shape, dtype=xp.float64, device=device(y)) for _ in range(count)]
-    log_determinant = xp.empty(shape, dtype=xp.float64, device=device(y))
-    first = np.flatnonzero(np.diff(table_step, prepend=table_step[:1] - 1)).tolist()
-    starts, step = table_step[first], STEPS_PER_SCALE * np.arange(len(PRIOR_SCALES))
-    steps, rows = np.unique(starts[:, None] + step, return_inverse=True)
-    table = _table(steps, eigenbasis.eigenvalues, xp)
-    for start, stop, mine in zip(first, [*first[1:], len(y)], rows, strict=True):
-        weights, log_determinants = (values[beside(mine, y)] for values in table)
-        of_y, pixel = y[start:stop], whitened.pixel[start:stop]
-        of_u = u[pixel]
+    step = STEPS_PER_SCALE * np.arange(len(PRIOR_SCALES))
+    first = np.flatnonzero(np.diff(table_step, prepend=table_step[:1] - 1))
+    steps, rows = np.unique(table_step[first, None] + step, return_inverse=True)
+    weights, log_determinants = _table(steps, eigenbasis.eigenvalues, xp)
+    lengths = np.diff(first, append=len(y))
+    every_row = np.repeat(rows, lengths, axis=0)
+    shape = (6 if len(v) else 3, len(y), len(PRIOR_SCALES))
+    sums: Floats = xp.empty(shape, dtype=xp.float64, device=device(y))
+    if is_numpy_array(y):
+        put_weighted_sums(y, u, v, whitened.pixel, every_row, weights, sums)
+    else:
+        _put_products(whitened.pixel, projected, first, rows, weights, sums)
+    return list(sums), log_determinants[beside(every_row, y)]
+
+
+def _put_products(
+    pixel: Integers,
+    projected: tuple[Floats, Floats, Floats],
+    first: Integers,
+    rows: Integers,
+    weights: Floats,
+    sums: Floats,
+) -> None:
+    """Write weighted sums, (3 or 6, m, scales), by products with the table of like rows.
+
+    Parameters
+    ----------
+    pixel : ndarray of int, shape (m,)
+    projected : tuple of ndarray
+        y, u and v.
+    first : ndarray of int, shape (t,)
+        The first of the rows that have the same table.
+    rows : ndarray of int, shape (t, scales)
+        Their rows of `weights`.
+    weights : ndarray, shape (T, R)
+    sums : ndarray
+    """
+    y, u, v = projected
+    starts = first.tolist()
+    for start, stop, mine in zip(starts, [*starts[1:], len(y)], rows, strict=True):
+        its_weights, here = weights[beside(mine, y)], pixel[start:stop]
+        of_y, of_u = y[start:stop], u[here]
         pairs = [(of_y, of_y), (of_u, of_y), (of_u, of_u)]
         if len(v):
-            of_v = v[pixel]
+            of_v = v[here]
             pairs += [(of_v, of_y), (of_v, of_u), (of_v, of_v)]
-        for found, (one, other) in zip(sums, pairs, strict=True):
-            found[start:stop] = (one * other) @ weights.T
-        log_determinant[start:stop] = log_determinants
-    return sums, log_determinant
+        for number, (one, other) in enumerate(pairs):
+            sums[number, start:stop] = (one * other) @ its_weights.T
 
 
 # Those of all components, for batches of camera pixels with more and with less noise.

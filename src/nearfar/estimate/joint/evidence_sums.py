@@ -79,3 +79,63 @@ def sum_squares(
             step = first_step[m] + s * steps_per_scale
             squares[n, s] += sums[0, s] - of_direct + log_determinants[step]
             factors[n, s] *= factor
+
+
+@compiled
+def put_weighted_sums(
+    y: Floats,
+    u: Floats,
+    v: Floats,
+    pixel: Integers,
+    steps: Integers,
+    weights: Floats,
+    sums: Floats,
+) -> None:
+    """Write weighted sums over eigenvectors of the products of responses, light and errors.
+
+    Parameters
+    ----------
+    y : ndarray, shape (m, R), float64
+        Responses in units of their noise.
+    u : ndarray, shape (n, R), float64
+        Responses to unit direct light.
+    v : ndarray, shape (n or 0, R), float64
+        Responses to a unit error of the references.
+    pixel : ndarray of int, shape (m,)
+        Camera pixel of each row.
+    steps : ndarray of int, shape (m, S)
+        Step of the table of each row and prior scale.
+    weights : ndarray, shape (T, R), float64
+        Inverse variances at steps of the table.
+    sums : ndarray, shape (3 or 6, m, S), float64
+        To be written: of y y, u y and u u, and where there is v of v y, v u and v v.
+    """
+    count, scales = sums.shape[0], sums.shape[2]
+    products = np.empty((count, y.shape[1]))
+    for m in range(len(y)):
+        n = pixel[m]
+        for i in range(y.shape[1]):
+            of_y, of_u = y[m, i], u[n, i]
+            products[0, i], products[1, i], products[2, i] = of_y * of_y, of_u * of_y, of_u * of_u
+            if count > 3:
+                of_v = v[n, i]
+                products[3, i] = of_v * of_y
+                products[4, i] = of_v * of_u
+                products[5, i] = of_v * of_v
+        for p in range(0, count, 3):
+            one, other, third = products[p], products[p + 1], products[p + 2]
+            for s in range(0, scales, 2):
+                # Two scales at once, so that products are read half as often.
+                s_next = min(s + 1, scales - 1)
+                weight, its_next = weights[steps[m, s]], weights[steps[m, s_next]]
+                a, b, c, next_a, next_b, next_c = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+                for i in range(len(weight)):
+                    a += weight[i] * one[i]
+                    b += weight[i] * other[i]
+                    c += weight[i] * third[i]
+                    next_a += its_next[i] * one[i]
+                    next_b += its_next[i] * other[i]
+                    next_c += its_next[i] * third[i]
+                sums[p, m, s], sums[p + 1, m, s], sums[p + 2, m, s] = a, b, c
+                sums[p, m, s_next], sums[p + 1, m, s_next] = next_a, next_b
+                sums[p + 2, m, s_next] = next_c

@@ -69,6 +69,25 @@ def test_camera_pixels_that_are_drawn_aside_tell_nothing_of_others(crease):
         np.testing.assert_allclose(found[row], whole[row], atol=1e-4)
 
 
+@pytest.mark.parametrize(
+    ("drawn", "count", "is_moved"), [(0.12, 1, True), (0.25, 1, False), (0.25, 5, True)]
+)
+def test_far_off_are_lines_of_camera_pixels_alone(crease, drawn, count, is_moved):
+    """A camera pixel between two surfaces has a q of its own, and is no crease."""
+    transport, whole = crease
+    q, near = whole.copy(), transport.near.copy()
+    line = slice(14, 14 + count)
+    q[CREASE_ROW, line, 0] -= drawn
+    others = np.ones(PROJECTOR.width, dtype=bool)
+    others[line] = False
+    near[CREASE_ROW, others] = 0.0
+    split = split_physically(replace(transport, correspondence=q, near=near))
+    moved = np.zeros(PROJECTOR, dtype=bool)
+    moved.ravel()[split.elsewhere.pixels] = True
+    assert np.all(moved[CREASE_ROW, line] == is_moved)
+    assert not moved[:, others].any()
+
+
 @pytest.mark.parametrize("falling_off", [1, 31])
 def test_camera_pixels_of_a_crease_decide_together_whether_light_falls_off(crease, falling_off):
     """Noise may hide it from one, or show it to one."""

@@ -23,6 +23,9 @@ from nearfar.transport.seen import seen_of_projector
 
 # In projector pixels: how far a q is off, at least and at most.
 OFF = (0.02, 0.3)
+# A crease is a line of camera pixels: with fewer than so many within the square that decides
+# together, they are off by this at most.
+LINE, MOST_OFF_ALONE = 3, 0.2
 # What others tell deviates by less than this share of that.
 AGREEMENT = 0.2
 # Light beyond the one taken, over it: at least, or it does not fall off but stands alone, and at
@@ -56,6 +59,7 @@ def settled(transport: Transport, opaque: Booleans) -> Elsewhere:
     _, doubted = _drawn_aside(transport, single, transport.lit)
     others = transport.lit & ~ndimage.binary_dilation(doubted, NEXT_TO)
     told, chosen = _drawn_aside(transport, single, others)
+    chosen &= _in_line(chosen) | (_off(transport, told) < MOST_OFF_ALONE)
     pixels = np.flatnonzero(chosen)
     last = np.array(transport.projector) - 1
     places = np.clip(told.reshape(-1, 2)[pixels], 0, last)
@@ -92,9 +96,20 @@ def _drawn_aside(
 ) -> tuple[Floats, Booleans]:
     """Return the q that others tell, (Cy, Cx, 2), and the camera pixels whose own q is another."""
     told, deviation = told_by_others(transport.correspondence, telling)
-    off = np.abs(transport.correspondence - told).max(axis=-1)
+    off = _off(transport, told)
     # Comparisons with NaN are false: where no side tells anything.
     return told, single & (off > OFF[0]) & (off < OFF[1]) & (deviation < AGREEMENT * off)
+
+
+def _off(transport: Transport, told: Floats) -> Floats:
+    """Return by how much q is off from what others tell, (Cy, Cx), in projector pixels."""
+    return np.asarray(np.abs(transport.correspondence - told).max(axis=-1))
+
+
+def _in_line(chosen: Booleans) -> Booleans:
+    """Return which camera pixels have enough chosen ones about them to be a line, (Cy, Cx)."""
+    share = ndimage.uniform_filter(chosen.astype(np.float64), TOGETHER, mode="constant")
+    return np.asarray(share * TOGETHER**2 > LINE - 0.5)
 
 
 def _majority(pixels: Integers, votes: Booleans, chosen: Booleans) -> Booleans:

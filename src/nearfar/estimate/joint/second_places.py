@@ -31,8 +31,8 @@ from nearfar.transport.direct import footprint
 # Log evidence by which photos must be more probable with a second place than without. A camera
 # pixel has up to eight neighbours with five places each.
 LEAST_GAIN = 20.0
-# And with the likeliest of the coarse places, for finer ones about it to be tried. Of 297 second
-# places on eight scenes the least was -7.
+# Log evidence that the likeliest coarse place must add for finer places about it to be tried. The
+# least that any of 297 second places on eight scenes had was -7.
 LEAST_COARSE_GAIN = -10.0
 # Places about a neighbour's q that are tried, projector pixels down and across; and those about the
 # likeliest of them.

@@ -23,8 +23,8 @@ from nearfar.transport.seen import seen_of_projector
 
 # In projector pixels: how far a q is off, at least and at most.
 OFF = (0.02, 0.3)
-# A crease is a line of camera pixels: with fewer than so many within the square that decides
-# together, they are off by this at most.
+# Camera pixels that make a line within the square that decides together, at least. Where there are
+# fewer, a q that is off by more than this lies between two surfaces.
 LINE, MOST_OFF_ALONE = 3, 0.2
 # What others tell deviates by less than this share of that.
 AGREEMENT = 0.2

@@ -27,8 +27,8 @@ LEAST_SHARE = 0.05
 GAIN = 2.0
 # Or its inter-reflection, as a share of its light, is more by this factor than that of either side.
 STANDS_OUT = 2.0
-# There a body at q that light tells no share of has this one, if the camera pixel has this share of
-# the light of the darker side at least: with less it sees a shadow.
+# Share of a body at q where inter-reflection stands out and light tells none. Camera pixels with a
+# lesser share of the darker side's light see a shadow, and are left alone.
 BODY_AT_Q, LEAST_BRIGHT = 0.9, 0.5
 # Direct light that is more than that of a surface by this factor is not of that surface.
 MOST_DIRECT = 1.5

@@ -6,15 +6,12 @@ Index convention: arrays are (n, channels, ...); r runs over real responses, w o
 inside, g over y and the amplitudes of `nuisance`; m over pairs of a camera pixel and a channel.
 """
 
-from typing import Any
-
 import numpy as np
-from array_api_compat import device
 
 from nearfar.arrays import Floats, beside, fetch, namespace, product
 from nearfar.estimate.joint import nuisance
 from nearfar.estimate.joint.batch import PixelBatch
-from nearfar.estimate.joint.clipped_windows import clippings_of, solve_windows
+from nearfar.estimate.joint.clipped_windows import Ratios, clippings_of, solve_windows
 from nearfar.estimate.joint.solve import PosteriorMean, near_noise
 from nearfar.illumination.centred_basis import CentredBasis
 from nearfar.priors.responses import ResponsePrior
@@ -35,40 +32,44 @@ def solve_clipped(
     precision = nuisance.prior_precision(batch, centred.near_basis)
     patterns = xp.astype(centred.on_window, xp.float64) * deviation
     clippings = clippings_of(fetch(batch.inside))
+    ratios, ratio_of_pair = np.unique(fetch(ratio), return_inverse=True)
+    of_pair = ratio_of_pair.ravel()
+    table = 1.0 / (beside(ratios[:, None], far_variance) * far_variance + 1.0 / multiplicity)
+    weight = table[beside(of_pair, table)][:, None]
+    # y and the responses to amplitudes, of each pair.
+    alike = xp.broadcast_to(
+        per_amplitude[:, None], (number, channels, per_amplitude.shape[1], count)
+    )
+    y = xp.concat([batch.responses[:, :, None], alike], axis=2)
+    y = xp.astype(y, xp.float64).reshape((number * channels, y.shape[2], count))
+    weighted = y * weight
+    right = product(weighted, patterns)
+    of = np.repeat(np.arange(number), channels)
+    solved = solve_windows(right, clippings, of, prior, Ratios(ratios, of_pair, table), centred)
+    products = y @ xp.permute_dims(weighted, (0, 2, 1))
+    products -= right @ xp.permute_dims(solved, (0, 2, 1))
+    variance = xp.astype(batch.noise, xp.float64).reshape((-1, 1)) ** 2
+    products /= variance[..., None]
+    shape = precision.shape
+    amplitudes = nuisance.solve(
+        products[:, 1:, 1:], products[:, 1:, 0], precision.reshape((-1, shape[2]))
+    )
+    # y less the responses to the amplitudes.
+    factors = xp.concat([xp.ones_like(amplitudes[:, :1]), -amplitudes], axis=1)[:, None]
+    window = (factors @ solved)[:, 0]
+    rest = ((factors @ y)[:, 0] - window @ patterns.T) * weight[:, 0]
+    of_far = beside(ratios[of_pair, None], rest) * far_variance
 
-    def empty(*shape: int, dtype: Any = None) -> Any:
-        return xp.empty(shape, dtype=dtype or xp.float32, device=device(batch.responses))
+    def by_pixel(values: Floats) -> Floats:
+        """Return values of pairs, (n, channels, ...), float32."""
+        found: Floats = xp.astype(values, xp.float32).reshape((number, channels, -1))
+        return found
 
-    amplitudes = empty(*precision.shape, dtype=xp.float64)
-    windows = empty(number, channels, len(deviation))
-    far, residual = empty(number, channels, count), empty(number, channels, count)
-    ratio_of_pair = fetch(ratio)
-    for value in np.unique(ratio_of_pair):
-        weight = 1.0 / (float(value) * far_variance + 1.0 / multiplicity)
-        of, channel = np.nonzero(ratio_of_pair == value)
-        c, i = beside(of, precision), beside(channel, precision)
-        y = xp.astype(
-            xp.concat([batch.responses[c, i, None], per_amplitude[c]], axis=1), xp.float64
-        )
-        weighted = y * weight
-        right = product(weighted, patterns)
-        solved = solve_windows(right, clippings, of, prior, float(value), weight, centred)
-        products = y @ xp.permute_dims(weighted, (0, 2, 1))
-        products -= right @ xp.permute_dims(solved, (0, 2, 1))
-        variance = xp.astype(batch.noise[c, i], xp.float64)[:, None] ** 2
-        products /= variance[..., None]
-        amplitudes[c, i] = nuisance.solve(products[:, 1:, 1:], products[:, 1:, 0], precision[c, i])
-        # y less the responses to the amplitudes.
-        factors = xp.concat([xp.ones_like(amplitudes[c, i][:, :1]), -amplitudes[c, i]], axis=1)
-        window = (factors[:, None] @ solved)[:, 0]
-        rest = ((factors[:, None] @ y)[:, 0] - window @ patterns.T) * weight
-        windows[c, i] = xp.astype(window * deviation, xp.float32)
-        far[c, i] = xp.astype(rest * (float(value) * far_variance), xp.float32)
-        residual[c, i] = xp.astype(rest / variance, xp.float32)
+    residual = by_pixel(rest / variance)
     return PosteriorMean(
-        amplitudes=nuisance.in_full(amplitudes, batch),
-        near=windows,
-        far=far,
+        amplitudes=nuisance.in_full(amplitudes.reshape(shape), batch),
+        near=by_pixel(window * deviation),
+        far=by_pixel(rest * of_far),
         near_noise=near_noise(batch, prior, ratio),
         score=product(residual, centred.on_window),
     )

@@ -14,7 +14,12 @@ from typing import NamedTuple
 import numpy as np
 
 from nearfar.arrays import Booleans, Floats
-from nearfar.estimate.joint.clipped_windows import clippings_of, rounded_ratio, solve_windows
+from nearfar.estimate.joint.clipped_windows import (
+    Ratios,
+    clippings_of,
+    rounded_ratio,
+    solve_windows,
+)
 from nearfar.estimate.joint.posterior_variance import Functionals, PixelState, add_amplitudes
 from nearfar.illumination.centred_basis import CentredBasis
 from nearfar.priors.responses import ResponsePrior
@@ -107,7 +112,8 @@ def _solved(
         weighted = amplitudes * weight
         u = near * deviation - (far * gain) @ patterns
         right = np.concatenate([u, weighted @ patterns], axis=1)[of]
-        solved = solve_windows(right, clippings, of, prior, float(ratio), weight, centred)
+        one = Ratios(ratio[None], np.zeros_like(of), weight[None])
+        solved = solve_windows(right, clippings, of, prior, one, centred)
         of_u, of_amplitudes = solved[:, :each], solved[:, each:]
         before = far**2 @ (gain / multiplicity) + ratio * truncated
         given[of, channel] = before[of] + np.sum(right[:, :each] * of_u, axis=-1)

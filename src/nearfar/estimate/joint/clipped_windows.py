@@ -61,6 +61,24 @@ class Clippings(NamedTuple):
     rectangle: Integers
 
 
+class Ratios(NamedTuple):
+    """The variance ratios of pairs, which few values are, and what follows from them.
+
+    Attributes
+    ----------
+    values : ndarray, shape (V,)
+        Rounded; all of them that occur.
+    of_pair : ndarray of int, shape (m,)
+        Index of each pair's value.
+    weights : ndarray, shape (V, R), float64
+        1 / D.
+    """
+
+    values: Floats
+    of_pair: Integers
+    weights: Floats
+
+
 def clippings_of(inside: Booleans) -> Clippings:
     """Find the rectangles that the entries inside, (n, W^2), form."""
     side = round(np.sqrt(inside.shape[1]))
@@ -81,8 +99,7 @@ def solve_windows(
     clippings: Clippings,
     of: Integers,
     prior: ResponsePrior,
-    ratio: float,
-    weight: Floats,
+    ratios: Ratios,
     centred: CentredBasis,
 ) -> Floats:
     """Return Lambda^-1 times vectors of camera pixels' windows.
@@ -94,10 +111,7 @@ def solve_windows(
     of : ndarray of int, shape (m,)
         Indices of camera pixels among those of `clippings`.
     prior : ResponsePrior
-    ratio : float
-        Rounded, one for all of them.
-    weight : ndarray, shape (R,), float64
-        1 / D.
+    ratios : Ratios
     centred : CentredBasis
 
     Returns
@@ -106,49 +120,55 @@ def solve_windows(
         0 beyond the border.
     """
     xp = namespace(right)
-    side = round(np.sqrt(right.shape[-1]))
+    count, side = len(clippings.rows), round(np.sqrt(right.shape[-1]))
     deviation = beside(prior.factors.deviation, right)
-    scaled = _information(centred, weight) * deviation * deviation[:, None]
-    entries = scaled.reshape((side, side, side, side))
     entry_indices = np.arange(side * side).reshape(side, side)
+    numbers = beside(np.arange(right.shape[1])[:, None], right)
     solved: Floats = xp.zeros_like(right)
-    rectangle = clippings.rectangle[of]
-    for one in np.unique(rectangle):
+    # Pairs of one value and one rectangle follow each other.
+    group = ratios.of_pair * count + clippings.rectangle[of]
+    order = np.argsort(group, kind="stable")
+    first_of_group = np.flatnonzero(np.diff(group[order], prepend=-1))
+    precisions: dict[int, Floats] = {}
+    scaled = _information(centred, ratios.weights) * deviation * deviation[:, None]
+    entries = scaled.reshape((-1, side, side, side, side))
+    for pairs in np.split(order, first_of_group[1:]) if len(order) else ():
+        value, one = divmod(int(group[pairs[0]]), count)
         rows, columns = clippings.rows[one], clippings.columns[one]
-        inner = entry_indices[rows, columns].ravel()
-        alike = beside(np.flatnonzero(rectangle == one)[:, None, None], right)
-        numbers = beside(np.arange(right.shape[1])[:, None], right)
-        at = (alike, numbers, beside(inner, right))
-        precision = _smooth_precision(prior, entry_indices[rows, columns]) / ratio
-        matrix = entries[rows, columns, rows, columns].reshape((len(inner), len(inner)))
-        matrix = matrix + beside(precision, right)
-        found = xp.linalg.solve(matrix, right[at].reshape((-1, len(inner))).T).T
-        solved[at] = found.reshape((len(alike), right.shape[1], len(inner)))
+        inner = entry_indices[rows, columns]
+        if one not in precisions:
+            precisions[one] = _smooth_precision(prior, inner)
+        at = (beside(pairs[:, None, None], right), numbers, beside(inner.ravel(), right))
+        matrix = entries[value, rows, columns, rows, columns].reshape((inner.size, inner.size))
+        matrix = matrix + beside(precisions[one] / ratios.values[value], right)
+        found = xp.linalg.solve(matrix, right[at].reshape((-1, inner.size)).T).T
+        solved[at] = found.reshape((len(pairs), right.shape[1], inner.size))
     return solved
 
 
-def _information(centred: CentredBasis, weight: Floats) -> Floats:
-    """Return the information matrix B^T D^-1 B, (W^2, W^2).
+def _information(centred: CentredBasis, weights: Floats) -> Floats:
+    """Return the information matrices B^T D^-1 B of weights (V, R), (V, W^2, W^2).
 
     A cosine and its sine of one weight add up to the cosine of the difference of two entries, so
     there is one number for each difference.
     """
-    xp = namespace(weight)
+    xp = namespace(weights)
     cosine = np.flatnonzero(~centred.basis.is_sine)
     parts = np.diff(np.append(cosine, centred.basis.count))
-    weights = fetch(weight)
+    given = fetch(weights)
     information: Floats
-    if not np.allclose(weights[cosine], weights[cosine + parts - 1], rtol=1e-6):
+    of_cosine = given[:, cosine]
+    if np.any(np.abs(of_cosine - given[:, cosine + parts - 1]) > 1e-6 * of_cosine):
         patterns = xp.astype(centred.on_window, xp.float64)
-        information = (patterns.T * weight) @ patterns
+        information = (patterns.T * weights[:, None]) @ patterns
         return information
     window = round(np.sqrt(centred.on_window.shape[1]))
     down, across = centred.side_waves
-    of_difference = np.real((down.T * weights[cosine]) @ across)
+    of_difference = np.real((down.T * of_cosine[:, None]) @ across)
     # [y, x, y', x'] is of_difference[y - y', x - x'], counted from the middle.
     apart = np.subtract.outer(np.arange(window), np.arange(window)) + window - 1
-    table = of_difference[apart[:, None, :, None], apart[None, :, None, :]]
-    information = beside(table.reshape(window**2, window**2), weight)
+    tables = of_difference[:, apart[:, None, :, None], apart[None, :, None, :]]
+    information = beside(tables.reshape(-1, window**2, window**2), weights)
     return information
 
 

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from nearfar.arrays import Booleans, Floats
+from nearfar.arrays import Booleans, Floats, blocks, product
 from nearfar.estimate.joint.clipped_windows import (
     Ratios,
     clippings_of,
@@ -23,6 +23,10 @@ from nearfar.estimate.joint.clipped_windows import (
 from nearfar.estimate.joint.posterior_variance import Functionals, PixelState, add_amplitudes
 from nearfar.illumination.centred_basis import CentredBasis
 from nearfar.priors.responses import ResponsePrior
+
+# Of as many functionals in all, of pairs of a camera pixel and a channel, variances are solved for
+# at once.
+BLOCK_FUNCTIONALS = 8192
 
 
 def clipped_variance(
@@ -102,23 +106,32 @@ def _solved(
     patterns = centred.on_window.astype(np.float64) * deviation
     clippings = clippings_of(inside)
     each, number = far.shape[1], amplitudes.shape[1]
-    given = np.empty((*ratios.shape, each))
-    all_told = np.empty((*ratios.shape, number, number))
-    through_rows = np.empty((*ratios.shape, each, number))
-    for ratio in np.unique(ratios):
-        of, channel = np.nonzero(ratios == ratio)
-        weight = 1.0 / (ratio * prior.far_variance + 1.0 / multiplicity)
-        gain = ratio * prior.far_variance * weight
-        weighted = amplitudes * weight
-        u = near * deviation - (far * gain) @ patterns
-        right = np.concatenate([u, weighted @ patterns], axis=1)[of]
-        one = Ratios(ratio[None], np.zeros_like(of), weight[None])
-        solved = solve_windows(right, clippings, of, prior, one, centred)
+    pixels, channels = ratios.shape
+    given = np.empty((pixels * channels, each))
+    all_told = np.empty((pixels * channels, number, number))
+    through_rows = np.empty((pixels * channels, each, number))
+    values, of_pair = np.unique(ratios, return_inverse=True)
+    of_pair = of_pair.ravel()
+    table = 1.0 / (values[:, None] * prior.far_variance + 1.0 / multiplicity)
+    for pairs in blocks(len(of_pair), BLOCK_FUNCTIONALS // max(1, each)):
+        mine = of_pair[pairs]
+        of = np.arange(pairs.start, pairs.stop) // channels
+        weight, ratio = table[mine, None], values[mine, None]
+        gain = ratio[..., None] * prior.far_variance * weight
+        response, own = far[of] * gain, amplitudes[of]
+        weighted, transposed = own * weight, own.transpose(0, 2, 1)
+        u = near[of] * deviation - product(response, patterns)
+        right = np.concatenate([u, product(weighted, patterns)], axis=1)
+        known = Ratios(values, mine, table)
+        solved = solve_windows(right, clippings, of, prior, known, centred)
         of_u, of_amplitudes = solved[:, :each], solved[:, each:]
-        before = far**2 @ (gain / multiplicity) + ratio * truncated
-        given[of, channel] = before[of] + np.sum(right[:, :each] * of_u, axis=-1)
-        told = (weighted @ amplitudes.transpose(0, 2, 1))[of]
-        all_told[of, channel] = told - right[:, each:] @ of_amplitudes.transpose(0, 2, 1)
-        by_amplitudes = (far * gain) @ amplitudes.transpose(0, 2, 1)
-        through_rows[of, channel] = by_amplitudes[of] + of_u @ right[:, each:].transpose(0, 2, 1)
-    return _Solved(given, all_told, through_rows)
+        before = np.sum(far[of] * response / multiplicity, axis=-1) + ratio * truncated[of]
+        given[pairs] = before + np.sum(u * of_u, axis=-1)
+        right_of_amplitudes = right[:, each:].transpose(0, 2, 1)
+        all_told[pairs] = weighted @ transposed - right[:, each:] @ of_amplitudes.transpose(0, 2, 1)
+        through_rows[pairs] = response @ transposed + of_u @ right_of_amplitudes
+    return _Solved(
+        given.reshape(pixels, channels, each),
+        all_told.reshape(pixels, channels, number, number),
+        through_rows.reshape(pixels, channels, each, number),
+    )

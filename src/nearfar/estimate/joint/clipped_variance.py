@@ -24,9 +24,8 @@ from nearfar.estimate.joint.posterior_variance import Functionals, PixelState, a
 from nearfar.illumination.centred_basis import CentredBasis
 from nearfar.priors.responses import ResponsePrior
 
-# Of as many functionals in all, of pairs of a camera pixel and a channel, variances are solved for
-# at once.
-BLOCK_FUNCTIONALS = 8192
+# Functionals that are solved for at once, over all pairs of a camera pixel and a channel.
+BLOCK_FUNCTIONALS = 2048
 
 
 def clipped_variance(

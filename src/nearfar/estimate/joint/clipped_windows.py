@@ -130,7 +130,9 @@ def solve_windows(
     order = np.argsort(group, kind="stable")
     first_of_group = np.flatnonzero(np.diff(group[order], prepend=-1))
     precisions: dict[int, Floats] = {}
-    scaled = _information(centred, ratios.weights) * deviation * deviation[:, None]
+    scaled = _information(centred, ratios.weights)
+    scaled *= deviation
+    scaled *= deviation[:, None]
     entries = scaled.reshape((-1, side, side, side, side))
     for pairs in np.split(order, first_of_group[1:]) if len(order) else ():
         value, one = divmod(int(group[pairs[0]]), count)

@@ -77,6 +77,26 @@ def _transport(centres, lit=True, noise=NOISE, noise_share=1.0):
     )
 
 
+def _in_channels(transport, factors):
+    """Repeat the only channel of a transport, times factors."""
+    posterior, factors = transport.posterior, np.asarray(factors, np.float32)
+
+    def times_factors(values, names):
+        return {n: getattr(values, n) * factors for n in names}
+
+    shares = {
+        n: getattr(posterior, n) * np.ones_like(factors) for n in ("share_of_white", "noise_share")
+    }
+    of_light = times_factors(posterior, ("white", "offset_noise", "light_noise"))
+    wide = {n: np.repeat(getattr(transport, n), len(factors), axis=2) for n in ("near", "far")}
+    return replace(
+        transport,
+        **times_factors(transport, ("direct", "black", "noise")),
+        **wide,
+        posterior=replace(posterior, **of_light, **shares),
+    )
+
+
 def _prior_variance():
     """Prior variance of o, d and the shifts of q."""
     return 1.0 / common_precision(np.array([[WHITE]]), np.array([[OFFSET]]), SHIFT_DEVIATION)[0, 0]
@@ -248,6 +268,17 @@ def test_entries_are_as_uncertain_as_dense_algebra_says():
         assert rows.far[0, 0, place] == pytest.approx(expected, rel=5e-3)
 
 
+def test_camera_pixels_at_the_border_are_as_uncertain_side_by_side_as_alone():
+    centres = np.array([[0, 1], [11, 3], [5, 0], [0, 1], [1, 15]])
+    noise = NOISE * np.random.default_rng(2).uniform(0.3, 8.0, (1, len(centres), 2))
+    together = replace(_in_channels(_transport(centres), [1, 1]), noise=noise.astype(np.float32))
+    light = np.random.default_rng(1).random(PROJECTOR)
+    found = ErrorBars(together).picture(light)
+    for c, i in np.ndindex(noise.shape[1:]):
+        alone = _transport(centres[c : c + 1], noise=noise[0, c, i])
+        np.testing.assert_allclose(found[0, c, i], ErrorBars(alone).picture(light), rtol=1e-5)
+
+
 @pytest.mark.parametrize("lit", [True, False])
 def test_entries_are_the_same_line_by_line_and_some_at_a_time(lit, monkeypatch):
     transport = _transport(np.array([[6, 8], [0, 1]]), lit=lit)
@@ -297,21 +328,7 @@ def test_gains_scale_the_error_of_their_component():
 
 def test_colour_lights_go_channel_by_channel():
     transport = _transport(np.array([[6, 8], [5, 7]]))
-    posterior = transport.posterior
-
-    def doubled(values):
-        return np.concatenate([values, 2 * values], axis=2)
-
-    both = replace(
-        transport,
-        **{n: doubled(getattr(transport, n)) for n in ("direct", "near", "far", "black", "noise")},
-        posterior=replace(
-            posterior,
-            **{n: doubled(getattr(posterior, n)) for n in ("white", "offset_noise", "light_noise")},
-            share_of_white=np.repeat(posterior.share_of_white, 2, axis=2),
-            noise_share=np.repeat(posterior.noise_share, 2, axis=2),
-        ),
-    )
+    both = _in_channels(transport, [1, 2])
     lights = np.random.default_rng(1).random((*PROJECTOR, 2))
     found = ErrorBars(both).picture(lights)
     one, bars = ErrorBars(both), ErrorBars(transport)

@@ -62,12 +62,12 @@ class Clippings(NamedTuple):
 
 
 class Ratios(NamedTuple):
-    """The variance ratios of pairs, which few values are, and what follows from them.
+    """The distinct variance ratios of pairs, and the weights that follow from each.
 
     Attributes
     ----------
     values : ndarray, shape (V,)
-        Rounded; all of them that occur.
+        Each of those that occur, rounded.
     of_pair : ndarray of int, shape (m,)
         Index of each pair's value.
     weights : ndarray, shape (V, R), float64

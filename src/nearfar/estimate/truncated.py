@@ -180,9 +180,10 @@ def _unknown_densities(
     ratio = rows.squared_scale.mean(axis=1) / np.maximum(rows.squared_noise.mean(axis=1), TINY)
     octave = np.clip(np.rint(np.log2(np.maximum(ratio, TINY))), *OCTAVES)
     kinds, kind = np.unique(np.stack([rows.component, octave]), axis=1, return_inverse=True)
+    held = _held_cycles(transport)
     densities = [
         _unknown_density(
-            transport,
+            held,
             prior_components[int(place)],
             2.0**power if power < OCTAVES[1] else np.inf,
             rows.multiplicity,
@@ -193,15 +194,15 @@ def _unknown_densities(
 
 
 def _unknown_density(
-    transport: Transport, prior_component: PriorComponent, ratio: float, multiplicity: Floats
+    held: Floats, prior_component: PriorComponent, ratio: float, multiplicity: Floats
 ) -> Floats:
     """Return the spectral density of what an estimate misses at unit prior scale, (Py, Px).
 
     At frequencies that the transport does not hold it is the prior's, at others the bias that
     shrinkage leaves: S / (1 + s^2 m S / sigma^2)^2, measured m times.
     """
-    projector, radius = transport.projector, _cycles(transport.projector)
-    density = _expected_density(radius, prior_component, _held_cycles(transport))
+    projector = Size(*multiplicity.shape)
+    density = _expected_density(_cycles(projector), prior_component, held)
     density[0, 0] = 0.0
     # A cosine and a sine share the density of a pair.
     told = 0.5 * multiplicity * density

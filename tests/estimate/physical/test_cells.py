@@ -42,6 +42,8 @@ def test_groups_are_covered_as_their_cells_are_on_average(side, projector):
 
 def test_groups_sum_what_their_cells_have():
     rng = np.random.default_rng(2)
-    values = rng.normal(size=(len(cells.offsets()), 5)) + 1j
-    expected = [values[cells.groups() == g].sum(axis=0) for g in range(cells.groups().max() + 1)]
-    np.testing.assert_allclose(cells.summed(values), expected)
+    weights, *parts = rng.normal(size=(3, len(cells.offsets()), 5))
+    weights, values = weights[:, 0], parts[0] + 1j * parts[1]
+    weighted, groups = weights[:, None] * values, cells.groups()
+    expected = [weighted[groups == group].sum(axis=0) for group in range(groups.max() + 1)]
+    np.testing.assert_allclose(cells.summed(weights, values), expected)

@@ -12,6 +12,7 @@ from functools import lru_cache
 import numpy as np
 
 from nearfar.arrays import Complexes, Floats, Integers
+from nearfar.compiled import compiled
 from nearfar.illumination.near_basis import window_offsets
 from nearfar.transport.boxes import summed_area
 from nearfar.transport.model import Transport
@@ -60,11 +61,42 @@ def groups() -> Integers:
     return found
 
 
-def summed(values: Complexes) -> Complexes:
-    """Return sums over the groups of values (O, K), shape (G, K)."""
+@lru_cache(maxsize=1)
+def _by_groups() -> tuple[Integers, Integers]:
+    """Return offsets in the order of their groups, (O,), and where groups begin, (G + 1,)."""
     order = np.argsort(groups(), kind="stable")
-    first = np.flatnonzero(np.diff(groups()[order], prepend=-1))
-    return np.asarray(np.add.reduceat(values[order], first, axis=0))
+    return order, np.searchsorted(groups()[order], np.arange(groups().max() + 2))
+
+
+def summed(weights: Floats, values: Complexes) -> Complexes:
+    """Return sums over the groups of weighted values.
+
+    Parameters
+    ----------
+    weights : ndarray, shape (O,)
+    values : ndarray, shape (O, K)
+
+    Returns
+    -------
+    ndarray, shape (G, K)
+    """
+    order, bounds = _by_groups()
+    sums = np.zeros((len(bounds) - 1, values.shape[1]), dtype=values.dtype)
+    # Real numbers alone: half the work of complex ones.
+    _add_weighted(weights, values.view(np.float64), order, bounds, sums.view(np.float64))
+    return sums
+
+
+@compiled
+def _add_weighted(
+    weights: Floats, values: Floats, order: Integers, bounds: Integers, sums: Floats
+) -> None:
+    for group in range(len(sums)):
+        of_group = sums[group]
+        for place in range(bounds[group], bounds[group + 1]):
+            weight, row = weights[order[place]], values[order[place]]
+            for k in range(len(row)):
+                of_group[k] += weight * row[k]
 
 
 def covered(coverage: Floats, rounded: Integers, side: int) -> Floats:

@@ -64,14 +64,31 @@ def kernel(source: Dipole, radius: int, slope: Slope = FLAT, samples: int = SAMP
     -------
     ndarray, shape (2 radius + 1, 2 radius + 1), float64
     """
+    over_pixels, profile = (
+        _over_pixels(radius, samples),
+        _upper_half(source, radius, slope, samples),
+    )
+    half = over_pixels[:, : len(profile)] @ profile @ over_pixels.T
+    # The same half a turn about q.
+    return np.asarray(half + half[::-1, ::-1])
+
+
+def _upper_half(source: Dipole, radius: int, slope: Slope, samples: int) -> Floats:
+    """Return a dipole at samples above q, and half of it beside q."""
+    profile = diffuse_profile(source, _squared_distances(radius, slope, samples))
+    profile[-1] /= 2
+    return profile
+
+
+@lru_cache(maxsize=32)
+def _squared_distances(radius: int, slope: Slope, samples: int) -> Floats:
+    """Return squared distances from q of samples above it and beside it, along the surface."""
     reach = (radius + 1) * samples
     side = np.arange(-reach, reach + 1) / samples
     y, x = np.meshgrid(side[: reach + 1], side, indexing="ij")
-    half = diffuse_profile(source, y**2 + x**2 + (slope[0] * y + slope[1] * x) ** 2)
-    # The same half a turn about q.
-    profile = np.concatenate([half, half[-2::-1, ::-1]])
-    over_pixels = _over_pixels(radius, samples)
-    return np.asarray(over_pixels @ profile @ over_pixels.T)
+    square = y**2 + x**2 + (slope[0] * y + slope[1] * x) ** 2
+    square.flags.writeable = False
+    return np.asarray(square)
 
 
 @lru_cache(maxsize=4)

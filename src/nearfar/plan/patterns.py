@@ -205,8 +205,9 @@ class Picture(Pattern):
         return patterns.invert(drawn) if self.inverse else drawn.copy()
 
 
-# Each picture is shown twice, and again compared with in each estimate of a capture.
-@lru_cache(maxsize=4)
+# Each picture is shown twice, and again compared with in each estimate of a capture. Those of a
+# thousand photos are kept.
+@lru_cache(maxsize=16)
 def _picture(size: Size, seed: int) -> NDArray[np.uint8]:
     return patterns.quantise(natural_picture(size, seed).astype(np.float64))
 

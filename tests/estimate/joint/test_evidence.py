@@ -80,9 +80,17 @@ def test_sums_by_a_compiled_loop_are_those_of_products_with_tables(offset, monke
     whitened = whiten(batch_of(measurements, centres, centred))
     assert 1 < len(np.unique(whitened.table_step)) < len(whitened.table_step)
     prior = response_prior(COMPONENT, centred, measurements.multiplicity[centred.response_indices])
-    by_loop = log_evidence(whitened, prior)
+    # Determinants of many channels are more than any number.
+    channels = 100
+    each = {"responses", "white_ratio", "offset_ratio", "table_step", "pixel"}
+    many = whitened._replace(
+        **{name: np.repeat(getattr(whitened, name), channels, axis=0) for name in each}
+    )
+    by_loop = [log_evidence(one, prior) for one in (whitened, many)]
     monkeypatch.setattr(evidence, "is_numpy_array", lambda _array: False)
-    np.testing.assert_allclose(log_evidence(whitened, prior), by_loop, rtol=1e-11)
+    for one, found in zip((whitened, many), by_loop, strict=True):
+        np.testing.assert_allclose(log_evidence(one, prior), found, rtol=1e-11)
+    np.testing.assert_allclose(by_loop[1], channels * by_loop[0], rtol=1e-11)
 
 
 def test_a_camera_pixel_chooses_the_prior_component_that_it_was_drawn_from():

@@ -55,7 +55,8 @@ def assemble(
         if k in wanted or -k in wanted or is_on_grid(k, measurements.projector)
     ]
     basis = real_basis([DC, *low], measurements.projector)
-    kept = np.flatnonzero(np.isin(measured.index, [measured.frequencies.index(k) for k in low]))
+    number = {k: i for i, k in enumerate(measured.frequencies)}
+    kept = np.flatnonzero(np.isin(measured.index, [number[k] for k in low]))
     share_of_white = _share_of_white(measurements).astype(np.float32)
     white, share, far_indices = (
         beside(values, rows.near)

@@ -3,8 +3,7 @@
 The log evidence of a component at prior scale s, noise sigma and eigenvalues l_i is, up to a
 constant, -1/2 sum_i (y_i^2 / v_i + log v_i), v_i = s^2 l_i + sigma^2, with o and d integrated out.
 v_i depends on s and sigma through their ratio alone, so every camera pixel shares one table over
-variance ratios, and the sums over i are matrix products or, where each camera pixel's shall not
-depend on those beside it, compiled loops.
+variance ratios. Sums over i are compiled loops for NumPy arrays, and matrix products for others.
 
 A few screening responses make a shortlist, and all responses choose from it. The screening
 responses alone cost 1.7 dB on the wedge; all responses throughout take three times as long.
@@ -16,15 +15,15 @@ Index convention: arrays are (n, channels, ...); i runs over eigenvectors.
 """
 
 from collections.abc import Callable
-from functools import lru_cache
 from typing import Any, NamedTuple
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from array_api_compat import device, is_numpy_array
 
 from nearfar.arrays import Floats, Integers, beside, fetch, namespace, product_by_row
 from nearfar.estimate.joint.batch import PixelBatch
-from nearfar.estimate.joint.evidence_sums import put_weighted_sums, sum_squares
+from nearfar.estimate.joint.evidence_sums import sum_squares
 from nearfar.estimate.joint.nuisance import DIRECT_PRIOR_DEVIATION
 from nearfar.illumination.centred_basis import CentredBasis
 from nearfar.priors.fitted import PRIOR_SCALES
@@ -271,26 +270,78 @@ def log_evidence(whitened: WhitenedResponses, eigenbasis: Eigenbasis) -> Floats:
     ndarray, shape (n, scales), float64
         The sum over channels, up to a constant of the camera pixel.
     """
-    xp = namespace(whitened.responses)
     # In double precision: direct light takes most of the sums out again, and the choice between
     # components that are nearly as good would hang on rounding.
-    y = _double_product(whitened.responses, eigenbasis.eigenvectors)
-    u = _double_product(whitened.direct_weights, eigenbasis.of_footprint)
-    v = _double_product(whitened.of_offset, eigenbasis.eigenvectors)
+    if is_numpy_array(whitened.responses):
+        return _sum_by_loop(whitened, _projected(whitened, eigenbasis, _double_product), eigenbasis)
+    return _sum_by_products(whitened, eigenbasis)
+
+
+def log_evidence_by_row(whitened: WhitenedResponses, eigenbasis: Eigenbasis) -> Floats:
+    """Return the same for NumPy arrays, to single precision.
+
+    What is found for a camera pixel does not depend on those after it.
+    """
+    return _sum_by_loop(whitened, _projected(whitened, eigenbasis, product_by_row), eigenbasis)
+
+
+def _projected(
+    whitened: WhitenedResponses,
+    eigenbasis: Eigenbasis,
+    product: Callable[[Floats, Floats], Floats],
+) -> tuple[Floats, Floats, Floats]:
+    """Return the coordinates y of responses, u of light of q, and v of errors of the references.
+
+    Their shapes are (m, R), (n, R) and (n or 0, R).
+    """
+    return (
+        product(whitened.responses, eigenbasis.eigenvectors),
+        product(whitened.direct_weights, eigenbasis.of_footprint),
+        product(whitened.of_offset, eigenbasis.eigenvectors),
+    )
+
+
+def _sum_by_loop(
+    whitened: WhitenedResponses, projected: tuple[Floats, Floats, Floats], eigenbasis: Eigenbasis
+) -> Floats:
+    """Return the log evidence of NumPy arrays: a compiled loop sums row by row."""
+    steps = whitened.table_step
+    first, last = (int(step) // TABLE_STEPS * TABLE_STEPS for step in (steps[0], steps[-1]))
+    squares = np.zeros((len(whitened.direct_weights), len(PRIOR_SCALES)))
+    factors = np.ones_like(squares)
+    sum_squares(
+        *projected,
+        whitened.pixel,
+        steps - first,
+        STEPS_PER_SCALE,
+        _shared_table(eigenbasis, first, last + TABLE_STEPS),
+        _direct_variance(whitened)[:, 0],
+        _offset_variance(whitened)[:, 0],
+        squares,
+        factors,
+    )
+    squares += np.log(factors, out=factors)
+    squares *= -0.5
+    return squares
+
+
+def _sum_by_products(whitened: WhitenedResponses, eigenbasis: Eigenbasis) -> Floats:
+    """Return the log evidence of arrays of any library: sums are products with tables."""
+    xp = namespace(whitened.responses)
+    y, u, v = _projected(whitened, eigenbasis, _double_product)
     sums, log_determinant = _weighted_sums(whitened, (y, u, v), eigenbasis)
     yy, uy, uu, *of_offset = sums
     if of_offset:
         # Integrate o out first; what is left of y and u is independent of it.
         vy, vu, vv = of_offset
-        offset_variance = whitened.offset_ratio**2
+        offset_variance = _offset_variance(whitened)
         factor = 1.0 + offset_variance * vv
         yy, uy, uu = (
             whole - offset_variance * left * right / factor
             for whole, left, right in ((yy, vy, vy), (uy, vu, vy), (uu, vu, vu))
         )
         log_determinant = log_determinant + xp.log(factor)
-    # d in units of the noise has a prior of its own.
-    direct_variance = (DIRECT_PRIOR_DEVIATION * whitened.white_ratio) ** 2
+    direct_variance = _direct_variance(whitened)
     factor = 1.0 + direct_variance * uu
     squares = yy - direct_variance * uy**2 / factor
     found = -0.5 * (squares + log_determinant + xp.log(factor))
@@ -300,32 +351,18 @@ def log_evidence(whitened: WhitenedResponses, eigenbasis: Eigenbasis) -> Floats:
     return total
 
 
-def log_evidence_by_row(whitened: WhitenedResponses, eigenbasis: Eigenbasis) -> Floats:
-    """Return the same for NumPy arrays without errors of the references, float64.
+def _direct_variance(whitened: WhitenedResponses) -> Floats:
+    """Return the prior variance of direct light in units of the noise, (m, 1), float64."""
+    xp = namespace(whitened.white_ratio)
+    deviation: Floats = DIRECT_PRIOR_DEVIATION * xp.astype(whitened.white_ratio, xp.float64)
+    return deviation**2
 
-    A compiled loop sums row by row.
-    """
-    y = product_by_row(whitened.responses, eigenbasis.eigenvectors)
-    u = product_by_row(whitened.direct_weights, eigenbasis.of_footprint)
-    steps = whitened.table_step
-    first, last = (int(step) // TABLE_STEPS * TABLE_STEPS for step in (steps[0], steps[-1]))
-    direct_variance = (DIRECT_PRIOR_DEVIATION * whitened.white_ratio[:, 0].astype(np.float64)) ** 2
-    squares = np.zeros((len(u), len(PRIOR_SCALES)))
-    factors = np.ones_like(squares)
-    sum_squares(
-        y,
-        u,
-        whitened.pixel,
-        steps - first,
-        STEPS_PER_SCALE,
-        _shared_table(eigenbasis, first, last + TABLE_STEPS),
-        direct_variance,
-        squares,
-        factors,
-    )
-    squares += np.log(factors, out=factors)
-    squares *= -0.5
-    return squares
+
+def _offset_variance(whitened: WhitenedResponses) -> Floats:
+    """Return the variance of the references' error in units of the noise, (m, 1), float64."""
+    xp = namespace(whitened.offset_ratio)
+    deviation: Floats = xp.astype(whitened.offset_ratio, xp.float64)
+    return deviation**2
 
 
 def _double_product(rows: Floats, matrix: Floats) -> Floats:
@@ -340,23 +377,18 @@ def _weighted_sums(
     """Return weighted sums of products, and log determinants.
 
     Of y, light u of q and errors v of the references, the sums are yy, uy and uu, and where there
-    are such errors vy, vu and vv; each (m, scales). A compiled loop sums NumPy arrays row by row;
-    on other devices they are products with the table of each row.
+    are such errors vy, vu and vv; each (m, scales).
     """
-    y, u, v = projected
+    y, _, v = projected
     xp, table_step = namespace(y), fetch(whitened.table_step)
     step = STEPS_PER_SCALE * np.arange(len(PRIOR_SCALES))
     first = np.flatnonzero(np.diff(table_step, prepend=table_step[:1] - 1))
     steps, rows = np.unique(table_step[first, None] + step, return_inverse=True)
     weights, log_determinants = _table(steps, eigenbasis.eigenvalues, xp)
-    lengths = np.diff(first, append=len(y))
-    every_row = np.repeat(rows, lengths, axis=0)
+    every_row = np.repeat(rows, np.diff(first, append=len(y)), axis=0)
     shape = (6 if len(v) else 3, len(y), len(PRIOR_SCALES))
     sums: Floats = xp.empty(shape, dtype=xp.float64, device=device(y))
-    if is_numpy_array(y):
-        put_weighted_sums(y, u, v, whitened.pixel, every_row, weights, sums)
-    else:
-        _put_products(whitened.pixel, projected, first, rows, weights, sums)
+    _put_products(whitened.pixel, projected, first, rows, weights, sums)
     return list(sums), log_determinants[beside(every_row, y)]
 
 
@@ -395,12 +427,18 @@ def _put_products(
             sums[number, start:stop] = (one * other) @ its_weights.T
 
 
-# Those of all components, for batches of camera pixels with more and with less noise.
-@lru_cache(maxsize=64)
 def _shared_table(eigenbasis: Eigenbasis, first: int, last: int) -> tuple[Floats, Floats]:
     """Return the table for rows that begin at steps from `first` to before `last`."""
-    beyond = last + STEPS_PER_SCALE * len(PRIOR_SCALES)
-    return _table(np.arange(first, beyond), eigenbasis.eigenvalues, np)
+    kept = _tables.setdefault(eigenbasis, {})
+    if (first, last) not in kept:
+        beyond = last + STEPS_PER_SCALE * len(PRIOR_SCALES)
+        kept[first, last] = _table(np.arange(first, beyond), eigenbasis.eigenvalues, np)
+    return kept[first, last]
+
+
+# Of components in use, by the steps they begin and end with: batches have more noise or less.
+_tables: WeakKeyDictionary[Eigenbasis, dict[tuple[int, int], tuple[Floats, Floats]]]
+_tables = WeakKeyDictionary()
 
 
 def _table(steps: Integers, eigenvalues: Floats, xp: Any) -> tuple[Floats, Floats]:

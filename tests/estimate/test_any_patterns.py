@@ -17,6 +17,7 @@ from nearfar.priors.covariance import far_variance, near_covariance
 from nearfar.transport.model import Transport
 from nearfar.transport.posterior import PatternPosterior
 from nearfar.transport.store import load_transport, save_transport
+from tests.estimate.lights_together import assert_each_light_has_its_own_errors
 from tests.metadata import change_attributes
 
 PROJECTOR = Size(8, 10)
@@ -129,6 +130,10 @@ def test_error_bars_are_those_of_plain_linear_algebra(transport, patterns):
         lit = np.isfinite(PLACES[c, 0])
         known = np.sqrt(covariance[1, 1]) if lit else 0.0
         assert of_direct[c] == pytest.approx(known, rel=1e-3)
+
+
+def test_each_of_several_lights_has_its_own_errors(transport):
+    assert_each_light_has_its_own_errors(transport)
 
 
 def test_error_bars_of_rows_are_those_of_plain_linear_algebra(transport, patterns):

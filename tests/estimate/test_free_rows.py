@@ -12,6 +12,7 @@ from nearfar.illumination.real_basis import basis_of_every_frequency
 from nearfar.transport.model import Transport
 from nearfar.transport.posterior import FreePosterior
 from nearfar.transport.verdict import KeptVerdict
+from tests.estimate.lights_together import assert_each_light_has_its_own_errors
 
 LAMPS, PIXELS, BLACK = 32, 200, 0.03
 
@@ -144,21 +145,20 @@ def test_error_bars_of_a_transport_are_those_of_its_direct_light_and_of_each_lam
     projector = Size(4, LAMPS // 4)
     q = np.stack(np.divmod(lamps, projector.width), axis=-1).astype(np.float32)
     q[lamps < 0] = np.nan
-    bars = ErrorBars(
-        Transport(
-            projector=projector,
-            correspondence=q[None],
-            direct=np.zeros((1, 3, 1), np.float32),
-            near=np.zeros((1, 3, 1, 0, 0), np.float32),
-            far=np.zeros((1, 3, 1, LAMPS), np.float32),
-            far_basis=basis_of_every_frequency(projector),
-            black=np.zeros((1, 3, 1), np.float32),
-            noise=noise[None, :, None],
-            parts=("direct", "free"),
-            posterior=posterior_of(design_of(few), np.full((1, 3), ratio, np.float32)),
-            verdict=KeptVerdict("doubtful", widening=2.0),
-        )
+    transport = Transport(
+        projector=projector,
+        correspondence=q[None],
+        direct=np.zeros((1, 3, 1), np.float32),
+        near=np.zeros((1, 3, 1, 0, 0), np.float32),
+        far=np.zeros((1, 3, 1, LAMPS), np.float32),
+        far_basis=basis_of_every_frequency(projector),
+        black=np.zeros((1, 3, 1), np.float32),
+        noise=noise[None, :, None],
+        parts=("direct", "free"),
+        posterior=posterior_of(design_of(few), np.full((1, 3), ratio, np.float32)),
+        verdict=KeptVerdict("doubtful", widening=2.0),
     )
+    bars = ErrorBars(transport)
     # Direct light is one lamp more, which shines where the lamp does.
     rows = bars.component_rows(slice(None))
     light = np.random.default_rng(2).random(projector).astype(np.float32)
@@ -179,6 +179,7 @@ def test_error_bars_of_a_transport_are_those_of_its_direct_light_and_of_each_lam
         alone = 2.0 * np.sqrt(lights @ covariance @ lights)
         assert free_alone[c] == pytest.approx(alone, rel=2e-3)
     np.testing.assert_allclose(bars.along(0, 1).far[0], rows.far[0, 0, 8:16], rtol=1e-6)
+    assert_each_light_has_its_own_errors(transport)
 
 
 def test_error_bars_hold_for_rows_as_they_are_expected():

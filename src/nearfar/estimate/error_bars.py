@@ -6,7 +6,7 @@ the joint estimate, of the estimate from any patterns, or of free rows.
 Index convention: arrays are (n, channels, ...), n camera pixels or functionals of one of them.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Protocol
 
 import numpy as np
@@ -26,8 +26,11 @@ from nearfar.transport.gains import Gains, gains_on, why_unjudgeable
 from nearfar.transport.model import Transport
 from nearfar.transport.posterior import FreePosterior, PatternPosterior
 
-# Camera pixels of a batch.
+# Camera pixels of a batch, under one light.
 BATCH_PIXELS = 2048
+# Lights under which errors are computed together: so many at most, and fewer where they or their
+# pictures have many values.
+LIGHTS_TOGETHER, VALUES_TOGETHER = 8, 2**24
 # Smaller shares of a footprint are rounding.
 SHARE_FLOOR = 1e-9
 # Entries of a row whose variance is computed at once.
@@ -37,8 +40,8 @@ ENTRIES_AT_ONCE = 2**14
 class Variances(Protocol):
     """Posterior variances of a transport's rows, in squares of photo units."""
 
-    def of_picture(self, light: Floats, gains: Gains) -> Callable[[slice], Floats]:
-        """Return a function of camera pixels: variances (n, channels) under a light (P,)."""
+    def of_pictures(self, lights: Floats, gains: Gains) -> Callable[[slice], Floats]:
+        """Return a function of camera pixels: variances (n, h, channels) under lights (h, P)."""
         ...
 
     def change_by_place(self, light: Floats, gains: Gains) -> Callable[[slice], Floats]:
@@ -169,17 +172,19 @@ class ErrorBars:
         """
         gains = gains_on(self._transport.parts, direct, near, far, free)
 
-        def squares_under(flat: Floats) -> Callable[[slice], Floats]:
-            variances = self._variances.of_picture(flat, gains)
-            changes = self._variances.change_by_place(flat, gains)
+        def squares_under(lights: Floats) -> Callable[[slice], Floats]:
+            variances = self._variances.of_pictures(lights, gains)
+            changes = [self._variances.change_by_place(flat, gains) for flat in lights]
 
             def of_batch(batch: slice) -> Floats:
                 before = variances(batch)
-                return np.asarray(np.maximum(before + changes(batch), LEAST_LEFT * before))
+                change = np.stack([of_light(batch) for of_light in changes], axis=1)
+                return np.asarray(np.maximum(before + change, LEAST_LEFT * before))
 
             return of_batch
 
-        return self._transport.picture(np.sqrt(self._squares(light, squares_under)))
+        (squares,) = self._squares([light], squares_under)
+        return self._transport.picture(np.sqrt(squares))
 
     def mean_squares(self, light: Floats) -> Floats:
         """Return the mean square of the errors of a relit picture that the prior expects.
@@ -201,32 +206,68 @@ class ErrorBars:
         InputError
             As `Transport.relight`.
         """
-        gains = gains_on(self._transport.parts, 1.0, 1.0, 1.0, 1.0)
-        squares = self._squares(light, lambda flat: self._variances.of_picture(flat, gains))
-        return self._transport.picture(squares)
+        (found,) = self.mean_squares_under([light])
+        return found
+
+    def mean_squares_under(self, lights: Sequence[Floats]) -> list[Floats]:
+        """Return `mean_squares` under each of several lights.
+
+        It takes less time than one light after the other: most of what is computed is the same.
+
+        Parameters
+        ----------
+        lights : sequence of ndarray, shape (Py, Px) or (Py, Px, channels)
+
+        Returns
+        -------
+        list of ndarray, shape (Cy, Cx) or (Cy, Cx, channels), float32
+
+        Raises
+        ------
+        InputError
+            As `Transport.relight`.
+        """
+        transport = self._transport
+        gains = gains_on(transport.parts, 1.0, 1.0, 1.0, 1.0)
+        values = max(transport.camera.pixels * transport.channels, transport.projector.pixels)
+        together = max(1, min(LIGHTS_TOGETHER, VALUES_TOGETHER // values))
+        found: list[Floats] = []
+        for some in blocks(len(lights), together):
+            found += self._squares(
+                lights[some], lambda flat: self._variances.of_pictures(flat, gains)
+            )
+        return [transport.picture(squares) for squares in found]
 
     def _squares(
-        self, light: Floats, squares_under: Callable[[Floats], Callable[[slice], Floats]]
-    ) -> Floats:
-        """Return squares of error bars of all camera pixels, (C, channels), float32."""
+        self,
+        lights: Sequence[Floats],
+        squares_under: Callable[[Floats], Callable[[slice], Floats]],
+    ) -> list[Floats]:
+        """Return squares of error bars of all camera pixels, (C, channels), under each light.
+
+        Parameters
+        ----------
+        lights : sequence of ndarray
+        squares_under : callable
+            Returns, for lights (h, P), a function of camera pixels: squares (n, h, channels).
+        """
         transport = self._transport
-        lights = transport.lights(light)
-        number, channels = transport.camera.pixels, transport.channels
-        found = np.empty((number, channels), dtype=np.float32)
-        for place, flat in enumerate(lights):
-            of_batch = squares_under(flat)
-            own = slice(None) if len(lights) == 1 else slice(place, place + 1)
+        # A light of several channels is one light for each.
+        flat = [transport.lights(light) for light in lights]
+        each = np.concatenate(flat)
+        of_batch = squares_under(each)
+        shape = (transport.camera.pixels, len(each), transport.channels)
+        found = np.empty(shape, dtype=np.float32)
 
-            def work(
-                batch: slice,
-                of_batch: Callable[[slice], Floats] = of_batch,
-                own: slice = own,
-            ) -> None:
-                found[batch, own] = self._widening**2 * of_batch(batch)[:, own]
+        def work(batch: slice) -> None:
+            found[batch] = self._widening**2 * of_batch(batch)
 
-            side_by_side(work, blocks(number, BATCH_PIXELS))
+        side_by_side(work, blocks(len(found), max(1, BATCH_PIXELS // len(each))))
         found[self._unknown] = np.inf
-        return found
+        by_light = np.split(found, np.cumsum([len(its) for its in flat])[:-1], axis=1)
+        return [
+            its[:, 0] if its.shape[1] == 1 else np.einsum("ncc->nc", its).copy() for its in by_light
+        ]
 
     def direct(self) -> Floats:
         """Return the standard deviation of d, (Cy, Cx, channels); 0 without direct light.

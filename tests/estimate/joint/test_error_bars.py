@@ -36,6 +36,7 @@ from nearfar.transport.model import Transport
 from nearfar.transport.posterior import Posterior
 from nearfar.transport.quality import Quality
 from nearfar.workflow.acquire import acquire_in_memory
+from tests.estimate.lights_together import assert_each_light_has_its_own_errors
 
 PROJECTOR = Size(12, 16)
 WINDOW = 5
@@ -277,6 +278,18 @@ def test_camera_pixels_at_the_border_are_as_uncertain_side_by_side_as_alone():
     for c, i in np.ndindex(noise.shape[1:]):
         alone = _transport(centres[c : c + 1], noise=noise[0, c, i])
         np.testing.assert_allclose(found[0, c, i], ErrorBars(alone).picture(light), rtol=1e-5)
+
+
+def test_each_of_several_lights_has_its_own_errors():
+    transport = _in_channels(_transport(np.array([[6, 8], [0, 1], [5, 7], [11, 3]])), [1, 2])
+    q = transport.correspondence.copy()
+    q[0, 2] = np.nan
+    second = np.full_like(q, np.nan)
+    second[0, :2] = [[2.4, 13.7], [9.1, 3.2]]
+    of_second = np.full(transport.direct.shape, 0.2, np.float32)
+    assert_each_light_has_its_own_errors(
+        replace(transport, correspondence=q, second_place=second, second_direct=of_second)
+    )
 
 
 @pytest.mark.parametrize("lit", [True, False])

@@ -23,6 +23,7 @@ from nearfar.rigs.simulated.projector import SimulatedProjector
 from nearfar.rigs.simulated.rig import SimulatedRig
 from nearfar.scenes.cache import cached_scene
 from nearfar.workflow.acquire import acquire_in_memory
+from tests.estimate.lights_together import assert_each_light_has_its_own_errors
 
 CAMERA = Size(8, 40)
 PROJECTOR = Size(70, 90)
@@ -131,6 +132,7 @@ def test_photos_with_next_to_no_noise_do_no_harm():
         measurements = measure(acquire_in_memory(plan, rig))
         q = correspond_by_phase(measurements, pitch=1).q
         found = estimate_jointly(measurements, q, window, plan.far, pitch=4)
+        assert_each_light_has_its_own_errors(found)
         bars, pictures = nearfar.ErrorBars(found), [found @ light for light in lights]
         truths = [scene @ light for light in lights]
         within = [

@@ -75,31 +75,34 @@ class PatternVariances:
         self._far = {n: far_covariance(self._model, components[n]) for n in used}
         self._far_variance = {n: far_variance(basis, components[n]) for n in used}
 
-    def of_picture(self, light: Floats, gains: Gains) -> Callable[[slice], Floats]:
-        """Return a function of camera pixels: variances (n, channels) under a light (P,)."""
+    def of_pictures(self, lights: Floats, gains: Gains) -> Callable[[slice], Floats]:
+        """Return a function of camera pixels: variances (n, h, channels) under lights (h, P)."""
         transport, model = self._transport, self._model
-        square = light.reshape(transport.projector)
-        far = gains.far * model.far_basis.analyse(light[None])
-        truncated = gains.far**2 * truncated_variance(
-            transport, light, self._posterior.prior_components
+        components = self._posterior.prior_components
+        far = gains.far * model.far_basis.analyse(lights)
+        truncated = gains.far**2 * np.stack(
+            [truncated_variance(transport, light, components) for light in lights], axis=1
         )
-        direct = gains.direct * look_up(light, self._where)
+        direct = gains.direct * look_up(lights, self._where).T
 
         def of_pixels(batch: slice) -> Floats:
             pixels = np.arange(len(self._lit))[batch]
-            found = np.empty((len(pixels), transport.channels))
+            found = np.empty((len(pixels), len(lights), transport.channels))
 
             def work(members: Integers) -> None:
                 mine = pixels[members]
                 one = mine[:1]
-                window = near.look_up(square, self._centres[one], model.window, model.projector)
+                windows = [
+                    near.look_up(light, self._centres[one], model.window, model.projector)[0]
+                    for light in lights
+                ]
                 functionals = _Functionals(
-                    direct[mine, None],
-                    gains.near * window * self._lit[one],
+                    direct[mine],
+                    gains.near * np.stack(windows) * self._lit[one],
                     far,
-                    truncated[self._component[one]],
+                    truncated[self._component[one[0]]],
                 )
-                found[members] = self._variances(mine, functionals)[:, :, 0]
+                found[members] = self._variances(mine, functionals).transpose(0, 2, 1)
 
             side_by_side(work, self._alike(pixels))
             return found

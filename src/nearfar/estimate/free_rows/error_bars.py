@@ -41,17 +41,18 @@ class FreeVariances:
         self._lamps = np.where(transport.lit.ravel(), lamps, -1)
         self._noise = transport.noise.reshape(-1, transport.channels).astype(np.float64)
 
-    def of_picture(self, light: Floats, gains: Gains) -> Callable[[slice], Floats]:
-        """Return a function of camera pixels: variances (n, channels) under a light (P,)."""
+    def of_pictures(self, lights: Floats, gains: Gains) -> Callable[[slice], Floats]:
+        """Return a function of camera pixels: variances (n, h, channels) under lights (h, P)."""
         # Of all camera pixels at once: they share the matrices of a variance ratio.
-        (of_photos,) = self._in_noise(slice(None), light[None], gains.direct, gains.far)
+        of_photos = self._in_noise(slice(None), lights, gains.direct, gains.far)
 
         def of_pixels(batch: slice) -> Floats:
-            found = np.asarray(of_photos[batch])
+            found = np.moveaxis(of_photos[:, batch], 0, 1).copy()
             if len(self._posterior.gain_errors):
                 rows = self._transport.component_rows(batch).far
-                errors = (gains.far * rows * light) @ self._posterior.gain_errors.T
-                found = found + (errors**2).sum(axis=2)
+                for h, light in enumerate(lights):
+                    errors = (gains.far * rows * light) @ self._posterior.gain_errors.T
+                    found[:, h] += (errors**2).sum(axis=2)
             return found
 
         return of_pixels

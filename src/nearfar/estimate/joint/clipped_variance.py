@@ -36,29 +36,25 @@ def clipped_variance(
     centred: CentredBasis,
     multiplicity: Floats,
 ) -> Floats:
-    """Return posterior variances for one prior component, (n, channels).
+    """Return posterior variances for one prior component, (n, k, channels).
 
     Parameters
     ----------
     prior : ResponsePrior
     state : PixelState
-        Of one camera pixel for each functional, or of one for all of them.
     functionals : Functionals
-        Their weights of window entries beyond the border are 0.
-    inside : ndarray of bool, shape (pixels, W^2)
+        Their weights of window entries beyond the border are 0. `truncated` is that of the
+        component, (k,) or (1,).
+    inside : ndarray of bool, shape (n, W^2)
         Which entries of each camera pixel's window lie on the projector.
     centred : CentredBasis
     multiplicity : ndarray, shape (R,)
         How often each response was measured.
     """
-    pixels, channels = state.noise.shape
-    count = len(functionals.white)
-    # Functionals side by side by camera pixel: (pixels, k, ...).
-    near = np.broadcast_to(functionals.near, (count, inside.shape[1])).astype(np.float64)
-    near = near.reshape(pixels, -1, near.shape[-1])
-    far = functionals.far.astype(np.float64).reshape(pixels, -1, functionals.far.shape[-1])
-    each = far.shape[1]
-    truncated = np.broadcast_to(functionals.truncated, count).reshape(pixels, each)
+    far = functionals.far.astype(np.float64)
+    count, each = far.shape[:2]
+    near = np.broadcast_to(functionals.near, (count, each, inside.shape[1])).astype(np.float64)
+    truncated = np.broadcast_to(functionals.truncated, each)
     amplitudes = state.amplitude_responses.transpose(0, 2, 1).astype(np.float64)
     asked = near, far, truncated, amplitudes
 
@@ -73,11 +69,10 @@ def clipped_variance(
     by_own = by_all = solve(variance)
     if np.any(variance_left != variance):
         by_all = solve(variance_left)
-    given = by_all.given * variance_left[..., None]
     return add_amplitudes(
-        given.transpose(0, 2, 1).reshape(count, channels),
+        by_all.given * variance_left[..., None],
         by_own.told / variance[..., None, None],
-        by_all.through_rows.transpose(0, 2, 1, 3).reshape(count, channels, amplitudes.shape[1]),
+        by_all.through_rows.transpose(0, 1, 3, 2),
         state,
         functionals,
     )
@@ -86,9 +81,9 @@ def clipped_variance(
 class _Solved(NamedTuple):
     """Variances at unit noise, and what they depend on; see `add_amplitudes`."""
 
-    given: Floats  # (pixels, channels, k)
-    told: Floats  # (pixels, channels, G, G)
-    through_rows: Floats  # (pixels, channels, k, G)
+    given: Floats  # (n, channels, k)
+    told: Floats  # (n, channels, G, G)
+    through_rows: Floats  # (n, channels, k, G)
 
 
 def _solved(
@@ -124,7 +119,7 @@ def _solved(
         known = Ratios(values, mine, table)
         solved = solve_windows(right, clippings, of, prior, known, centred)
         of_u, of_amplitudes = solved[:, :each], solved[:, each:]
-        before = np.sum(far[of] * response / multiplicity, axis=-1) + ratio * truncated[of]
+        before = np.sum(far[of] * response / multiplicity, axis=-1) + ratio * truncated
         given[pairs] = before + np.sum(u * of_u, axis=-1)
         right_of_amplitudes = right[:, each:].transpose(0, 2, 1)
         all_told[pairs] = weighted @ transposed - right[:, each:] @ of_amplitudes.transpose(0, 2, 1)

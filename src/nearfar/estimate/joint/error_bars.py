@@ -4,11 +4,12 @@ All of them are linear functionals h_o o + h_d d + h_n.n + h_f.f of a camera pix
 being what d and n leave of white. Given the prior component, o, d and q, the posterior is a
 Gaussian in the prior's eigenvectors; o, d and q add their own uncertainty.
 
-Index convention: arrays are (n, channels, ...), n camera pixels or functionals of one of them; r
-runs over real responses, w over window entries, i over eigenvectors, g over o, d and shifts of q.
+Index convention: arrays are (n, channels, ...), n camera pixels; k runs over functionals of each of
+them, h over lights, r over real responses, w over window entries, i over eigenvectors, g over o, d
+and shifts of q.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import lru_cache, partial
 from typing import Any, NamedTuple
 
@@ -60,23 +61,23 @@ ROOM_FOR_A_THIRD = 0.01
 HALF_STEP = 0.25
 
 
-class _Light(NamedTuple):
-    """A light whose pictures have error bars.
+class _Lights(NamedTuple):
+    """Lights whose pictures have error bars.
 
     Attributes
     ----------
-    mean : float
+    mean : ndarray, shape (h,)
     seen : callable
         As `JointVariances._seen`, for a batch of camera pixels.
-    overlap : ndarray, shape (R,), float32
+    overlap : ndarray, shape (h, R), float32
         With the responses that the transport holds, times the gain of far-range light.
-    truncated : ndarray, shape (components,)
+    truncated : ndarray, shape (components, h)
         See `Functionals`.
     at_second : callable
-        Responses of unit direct light from second places, and their derivatives, (n, 3).
+        Responses of unit direct light from second places, and their derivatives, (n, h, 3).
     """
 
-    mean: float
+    mean: Floats
     seen: Callable[[slice], tuple[Floats, Floats]]
     overlap: Floats
     truncated: Floats
@@ -110,19 +111,26 @@ class JointVariances:
             missed = share_missed(transport, posterior.prior_components, self._rows())
             self._room = np.minimum(missed / ROOM_FOR_A_THIRD, 1.0)
 
-    def of_picture(self, light: Floats, gains: Gains) -> Callable[[slice], Floats]:
-        """Return a function of camera pixels: variances (n, channels) under a light (P,)."""
-        truncated = gains.far**2 * truncated_variance(
-            self._transport, light, self._posterior.prior_components
+    def of_pictures(self, lights: Floats, gains: Gains) -> Callable[[slice], Floats]:
+        """Return a function of camera pixels: variances (n, h, channels) under lights (h, P)."""
+        transport, components = self._transport, self._posterior.prior_components
+        truncated = np.stack(
+            [truncated_variance(transport, light, components) for light in lights], axis=1
         )
-        transport, blurred = self._transport, None
+        blurred = None
         if transport.pitch > 1:
-            blurred = blurred_light(light.astype(np.float32), transport.pyramid)
-        seen = partial(self._seen, light=light, blurred=blurred)
-        overlap = gains.far * self._centred.basis.analyse(light) * self._is_held
-        at_second = partial(self._at_second, light[None])
-        shown = _Light(float(light.mean()), seen, overlap.astype(np.float32), truncated, at_second)
-        return lambda batch: self._variance(batch, self._of_light(batch, shown, gains))
+            pyramid = transport.pyramid
+            blurred = [blurred_light(light.astype(np.float32), pyramid) for light in lights]
+        seen = partial(self._seen, lights=lights, blurred=blurred)
+        overlap = gains.far * self._centred.basis.analyse(lights) * self._is_held
+        shown = _Lights(
+            lights.mean(axis=1).astype(np.float64),
+            seen,
+            overlap.astype(np.float32),
+            gains.far**2 * truncated,
+            partial(self._at_second, lights),
+        )
+        return lambda batch: self._variance(batch, self._of_lights(batch, shown, gains))
 
     def change_by_place(self, light: Floats, gains: Gains) -> Callable[[slice], Floats]:
         """Return a function of camera pixels: corrections of variances, (n, channels).
@@ -156,14 +164,12 @@ class JointVariances:
 
     def of_direct(self, batch: slice) -> Floats:
         """Return the variances of d at camera pixels, (n, channels)."""
-        number = len(self._centres[batch])
-        return self._of_light_from(
-            batch, self._of_amplitudes([1.0, 0.0, 0.0], np.zeros((number, 3)))
-        )
+        second = np.zeros((len(self._centres[batch]), 1, 3))
+        return self._of_light_from(batch, self._of_amplitudes([1.0, 0.0, 0.0], second))
 
     def of_second(self, batch: slice) -> Floats:
         """Return the variances of light from second places, (n, channels); 0 where none is."""
-        second = self._has_second(batch) * [1.0, 0.0, 0.0]
+        second = (self._has_second(batch) * [1.0, 0.0, 0.0])[:, None]
         return self._has_second(batch) * self._of_light_from(
             batch, self._of_amplitudes([0.0, 0.0, 0.0], second)
         )
@@ -172,29 +178,30 @@ class JointVariances:
         """Return the variances of sums of the amplitudes of direct light, (n, channels)."""
         number = len(amplitudes)
         functionals = Functionals(
-            np.zeros(number),
+            np.zeros((number, 1)),
             amplitudes,
-            np.zeros((number, self._transport.near_basis.count), dtype=np.float32),
-            np.zeros((number, self._centred.basis.count), dtype=np.float32),
-            np.zeros(len(self._posterior.prior_components)),
+            np.zeros((number, 1, self._transport.near_basis.count), dtype=np.float32),
+            np.zeros((number, 1, self._centred.basis.count), dtype=np.float32),
+            np.zeros((len(self._posterior.prior_components), 1)),
         )
-        return self._variance(batch, functionals)
+        return np.asarray(self._variance(batch, functionals)[:, 0])
 
     def of_window(self, pixel: int, values: Floats) -> Floats:
         """Return those of sums of one camera pixel's near-range functions, (m, channels)."""
+        number = len(values)
         functionals = Functionals(
-            np.zeros(len(values)),
-            self._of_amplitudes([0.0, 0.0, 0.0], np.zeros((len(values), 3))),
-            values,
-            np.zeros((len(values), self._centred.basis.count), dtype=np.float32),
-            np.zeros(len(self._posterior.prior_components)),
+            np.zeros((1, number)),
+            self._of_amplitudes([0.0, 0.0, 0.0], np.zeros((1, number, 3))),
+            values[None],
+            np.zeros((1, number, self._centred.basis.count), dtype=np.float32),
+            np.zeros((len(self._posterior.prior_components), 1)),
         )
-        return self._variance(slice(pixel, pixel + 1), functionals)
+        return np.asarray(self._variance(slice(pixel, pixel + 1), functionals)[0])
 
     def of_far(self, pixel: int, lines: slice) -> Floats:
         """Return those of one camera pixel's row of F on projector rows, (lines * Px, channels)."""
         one = slice(pixel, pixel + 1)
-        return self._variance(one, self._of_far(one, self._inside(one)[0], lines))
+        return np.asarray(self._variance(one, self._of_far(one, self._inside(one)[0], lines))[0])
 
     def _of_far(self, one: slice, inside: Floats, lines: slice) -> Functionals:
         """Return the entries of one camera pixel's row of F on some rows of the projector."""
@@ -203,73 +210,74 @@ class JointVariances:
         drawn = centred.basis.patterns_on(lines).T
         patterns = (drawn * centred.basis.weights * self._is_held).astype(np.float32)
         number = len(patterns)
-        centre = np.broadcast_to(self._centres[one], (number, 2))
+        second = self._has_second(one) * [-1.0 / total, 0.0, 0.0]
         return Functionals(
-            np.full(number, 1.0 / total),
-            self._of_amplitudes(
-                [-lit / total, 0.0, 0.0],
-                np.broadcast_to(self._has_second(one) * [-1.0 / total, 0.0, 0.0], (number, 3)),
-            ),
-            (-lit / total * inside[None]).astype(np.float32),
-            centred.recentre(patterns[:, None], centre)[:, 0],
-            np.zeros(len(self._posterior.prior_components)),
+            np.full((1, number), 1.0 / total),
+            self._of_amplitudes([-lit / total, 0.0, 0.0], np.broadcast_to(second, (1, number, 3))),
+            (-lit / total * inside[None, None]).astype(np.float32),
+            centred.recentre(patterns[None], self._centres[one]),
+            np.zeros((len(self._posterior.prior_components), 1)),
         )
 
-    def _of_light(self, batch: slice, light: "_Light", gains: Gains) -> Functionals:
-        """Return the functional that is the picture under a light."""
+    def _of_lights(self, batch: slice, lights: "_Lights", gains: Gains) -> Functionals:
+        """Return the functionals that are the pictures under lights."""
         transport, centred = self._transport, self._centred
         centres = self._centres[batch]
-        mean = gains.far * light.mean
-        in_window, direct = light.seen(batch)
-        inside = self._inside(batch)
-        overlaps = np.broadcast_to(light.overlap, (len(centres), 1, len(light.overlap)))
+        mean = gains.far * lights.mean
+        in_window, direct = lights.seen(batch)
+        inside = self._inside(batch)[:, None]
+        overlaps = np.broadcast_to(lights.overlap, (len(centres), *lights.overlap.shape))
         lit = transport.lit.ravel()[batch]
         direct = gains.direct * direct
-        direct[:, 0] -= mean * lit
-        second = gains.direct * light.at_second(batch)
-        second[:, 0] -= mean * self._has_second(batch)[:, 0]
+        direct[..., 0] -= mean * lit[:, None]
+        second = gains.direct * lights.at_second(batch)
+        second[..., 0] -= mean * self._has_second(batch)
+        near_range = gains.near * in_window - mean[:, None] * inside
         return Functionals(
-            np.full(len(centres), mean),
+            np.broadcast_to(mean, (len(centres), len(mean))),
             self._of_amplitudes(direct, second),
-            (lit[:, None] * (gains.near * in_window - mean * inside)).astype(np.float32),
-            centred.recentre(overlaps, centres)[:, 0],
-            light.truncated,
+            (lit[:, None, None] * near_range).astype(np.float32),
+            centred.recentre(overlaps, centres),
+            lights.truncated,
         )
 
     def _seen(
-        self, batch: slice, light: Floats, blurred: BlurredLight | None
+        self, batch: slice, lights: Floats, blurred: Sequence[BlurredLight] | None
     ) -> tuple[Floats, Floats]:
-        """Return the responses of unit near-range and unit direct light to a light (P,).
+        """Return the responses of unit near-range and unit direct light to lights (h, P).
 
         Returns
         -------
-        in_window : ndarray, shape (n, J)
-        direct : ndarray, shape (n, 3)
+        in_window : ndarray, shape (n, h, J)
+        direct : ndarray, shape (n, h, 3)
             Direct light, and its derivatives by q.
         """
         transport, projector = self._transport, self._transport.projector
         centres, q = self._centres[batch], transport.correspondence.reshape(-1, 2)[batch]
         if blurred is None:
-            return (
-                near.look_up(light.reshape(projector), centres, transport.window, projector),
-                responses_of_direct(q, light[None], projector)[..., 0],
-            )
+            in_window = [
+                near.look_up(light, centres, transport.window, projector) for light in lights
+            ]
+            direct = responses_of_direct(q, lights, projector)
+            return np.stack(in_window, axis=1), direct.transpose(0, 2, 1)
         pyramid, boxes = transport.pyramid, transport.boxes[batch]
 
         def at(places: Floats) -> Floats:
-            return box_axes(places, boxes, projector).means(blurred.table, projector)
+            where = box_axes(places, boxes, projector)
+            return np.stack([where.means(each.table, projector) for each in blurred], axis=1)
 
         steps = DIFFERENCE_STEP * np.eye(2)
         derivatives = [(at(q + step) - at(q - step)) / (2 * DIFFERENCE_STEP) for step in steps]
+        places = pyramid.places(centres)[:, None] + pyramid.steps
         return (
-            blurred.levels[pyramid.places(centres)[:, None] + pyramid.steps],
+            np.stack([each.levels[places] for each in blurred], axis=1),
             np.stack([at(q), *derivatives], axis=-1),
         )
 
     def _of_amplitudes(self, direct: Any, second: Floats) -> Floats:
-        """Return functionals of direct light, (n, 3), with those of second places, if any."""
+        """Return functionals of direct light, (n, k, 3), with those of second places, if any."""
         own = np.broadcast_to(np.asarray(direct, dtype=np.float64), second.shape)
-        return own if self._second is None else np.concatenate([own, second], axis=1)
+        return own if self._second is None else np.concatenate([own, second], axis=2)
 
     def _has_second(self, batch: slice) -> Floats:
         """Return 1 for each camera pixel that sees a second place, else 0, (n, 1)."""
@@ -278,15 +286,15 @@ class JointVariances:
         return np.isfinite(self._second[batch, :1]).astype(np.float64)
 
     def _at_second(self, lights: Floats, batch: slice) -> Floats:
-        """Return responses of unit direct light from second places, and derivatives, (n, 3)."""
+        """Return responses of unit direct light from second places, and derivatives, (n, h, 3)."""
         projector = self._transport.projector
         if self._second is None:
-            return np.zeros((len(self._centres[batch]), 3))
+            return np.zeros((len(self._centres[batch]), len(lights), 3))
 
         def seen(places: Floats) -> Floats:
             return look_up(lights, footprint(places, projector)).T
 
-        return _with_derivatives(self._second[batch], seen, len(lights))[..., 0]
+        return _with_derivatives(self._second[batch], seen, len(lights)).transpose(0, 2, 1)
 
     def _inside(self, batch: slice) -> Floats:
         """Return the share of each near-range function that lies on the projector, (n, J)."""
@@ -349,8 +357,9 @@ class JointVariances:
         return np.stack([light, shift, shift], axis=-1)
 
     def _variance(self, batch: slice, functionals: Functionals) -> Floats:
-        """Return variances, (n, channels), of each pixel's or of one pixel's many."""
-        return np.asarray(self._more(batch) * self._posterior_variance(batch, functionals))
+        """Return variances of functionals, (n, k, channels)."""
+        more = self._more(batch)[:, None]
+        return np.asarray(more * self._posterior_variance(batch, functionals))
 
     def _more(self, batch: slice) -> Floats:
         """Return how much larger variances are where there is a second place, (n, 1)."""
@@ -361,34 +370,33 @@ class JointVariances:
         )
 
     def _posterior_variance(self, batch: slice, functionals: Functionals) -> Floats:
-        """Return posterior variances, (n, channels)."""
+        """Return posterior variances, (n, k, channels)."""
         state = self._state(batch)
         clips = self._clips(batch)
-        if len(state.prior_component) == 1:
+        pixels = np.arange(*batch.indices(len(self._centres)))
+        if len(pixels) == 1:
             (place,) = state.prior_component
             its = functionals._replace(truncated=functionals.truncated[place])
-            return self._of_component(batch, int(place), bool(clips[0]), state, its)
-        found = np.empty((len(functionals.white), self._transport.channels))
-        pixels = np.arange(*batch.indices(len(self._centres)))
+            return self._of_component(pixels, int(place), bool(clips[0]), state, its)
+        found = np.empty((*functionals.white.shape, self._transport.channels))
         for place, clipped in np.unique(np.stack([state.prior_component, clips]), axis=1).T:
             rows = np.flatnonzero((state.prior_component == place) & (clips == clipped))
-            theirs = Functionals._make(
-                (*(part[rows] for part in functionals[:-1]), functionals.truncated[place])
-            )
+            theirs = functionals.only(rows)
+            its = theirs._replace(truncated=functionals.truncated[place])
             found[rows] = self._of_component(
-                pixels[rows], int(place), bool(clipped), state.only(rows), theirs
+                pixels[rows], int(place), bool(clipped), state.only(rows), its
             )
         return found
 
     def _of_component(
         self,
-        pixels: slice | Integers,
+        pixels: Integers,
         place: int,
         clipped: bool,
         state: PixelState,
         functionals: Functionals,
     ) -> Floats:
-        """Return posterior variances of camera pixels of one prior component, (n, channels)."""
+        """Return posterior variances of camera pixels of one prior component, (n, k, channels)."""
         prior = self._prior(place)
         if not clipped:
             return posterior_variance(prior, state, functionals)

@@ -122,7 +122,13 @@ def solve(normal: Floats, right: Floats, precision: Floats) -> Floats:
     right, precision : ndarray, shape (n, channels, G)
     """
     xp = namespace(normal)
+    found: Floats = xp.linalg.solve(regularised(normal, precision), right[..., None])[..., 0]
+    return found
+
+
+def regularised(normal: Floats, precision: Floats) -> Floats:
+    """Return normal + diag(precision), (n, channels, G, G); see `solve`."""
+    xp = namespace(normal)
     unit = xp.eye(precision.shape[-1], dtype=precision.dtype, device=device(precision))
-    regularised = normal + precision[..., None] * unit
-    found: Floats = xp.linalg.solve(regularised, right[..., None])[..., 0]
+    found: Floats = normal + precision[..., None] * unit
     return found

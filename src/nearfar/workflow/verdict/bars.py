@@ -1,5 +1,6 @@
 """Error bars of a transport whose relit pictures are compared with photos."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -46,14 +47,33 @@ def _without_noise(posterior: AnyPosterior) -> AnyPosterior:
     )
 
 
-def mean_square(bars: ErrorBars, light: Floats, usable: Booleans) -> float:
-    """Return the expected square of the error under a light, mean over usable camera pixels.
+def mean_squares(bars: ErrorBars, lights: Sequence[Floats], usable: Booleans) -> list[float]:
+    """Return the expected square of the error under each light, mean over usable camera pixels.
 
     Parameters
     ----------
     bars : ErrorBars
-    light : ndarray, shape (Py, Px)
+    lights : sequence of ndarray, shape (Py, Px)
     usable : ndarray of bool, shape (C,)
     """
-    squares = bars.mean_squares(light).reshape(len(usable), -1)[usable]
-    return float(np.mean(squares, dtype=np.float64))
+    squares = bars.mean_squares_under(lights)
+    return [
+        float(np.mean(one.reshape(len(usable), -1)[usable], dtype=np.float64)) for one in squares
+    ]
+
+
+def expected_and_unmeasured(
+    bars: Bars | None, lights: Sequence[Floats], usable: Booleans
+) -> list[tuple[float, float]] | list[tuple[None, None]]:
+    """Return these of photos with their noise, and with hardly any, under each light.
+
+    Parameters
+    ----------
+    bars : Bars, optional
+        None is returned in their place where there are none.
+    lights, usable
+        As `mean_squares` takes them.
+    """
+    if bars is None:
+        return [(None, None)] * len(lights)
+    return list(zip(*(mean_squares(each, lights, usable) for each in bars), strict=True))

@@ -18,7 +18,7 @@ from nearfar.transport.model import Transport
 from nearfar.transport.stored import StoredTransport
 from nearfar.workflow.reconstruction.sources import photos_without_drift
 from nearfar.workflow.verdict.bands import compare_in_bands, of_bands, usable_pixels
-from nearfar.workflow.verdict.bars import Bars, mean_square
+from nearfar.workflow.verdict.bars import Bars, mean_squares
 from nearfar.workflow.verdict.check_pairs import compare_pair
 from nearfar.workflow.verdict.held_out import HeldOut, HeldOutLight
 
@@ -121,11 +121,13 @@ def compare_lights(
     black = block.black.reshape(size)[usable]
     whites, blacks = find_references(photos.plan)
     of_white = _noise(photos, white + black, whites) + _noise(photos, black, blacks)
+    drawn = [light.pattern.draw(block.projector) / np.float32(255) for light in lights]
     if bars is not None:
-        of_white = mean_square(bars.of_all, ones, usable)
+        inverses = [1 - pattern for pattern in drawn]
+        of_white, *of_lights = mean_squares(bars.of_all, [ones, *drawn, *inverses], usable)
+        of_unmeasured = mean_squares(bars.of_unmeasured, drawn, usable)
     found = []
-    for light in lights:
-        pattern = light.pattern.draw(block.projector) / np.float32(255)
+    for number, (light, pattern) in enumerate(zip(lights, drawn, strict=True)):
         means = [
             of_bands(partial(_read, photos, numbers), rows).mean(axis=0)[usable]
             for numbers in (light.photos, light.inverses)
@@ -133,8 +135,8 @@ def compare_lights(
         expected = unmeasured = None
         share_of_pattern = 1.0
         if bars is not None:
-            expected, unmeasured = (mean_square(each, pattern, usable) for each in bars)
-            of_inverse = mean_square(bars.of_all, 1 - pattern, usable)
+            expected, unmeasured = of_lights[number], of_unmeasured[number]
+            of_inverse = of_lights[len(lights) + number]
             share_of_pattern = 2 * expected / max(expected + of_inverse, 1e-300)
         noise = _noise(photos, means[0], light.photos) + _noise(photos, means[1], light.inverses)
         pair = compare_pair(

@@ -12,7 +12,7 @@ from nearfar.progress import Report, ignore_progress
 from nearfar.transport.model import Transport
 from nearfar.transport.stored import StoredTransport
 from nearfar.workflow.verdict.bands import compare_in_bands, of_bands, usable_pixels
-from nearfar.workflow.verdict.bars import Bars, mean_square
+from nearfar.workflow.verdict.bars import Bars, expected_and_unmeasured, mean_squares
 from nearfar.workflow.verdict.correspondence_lights import WeighedLight, correspondence_lights
 from nearfar.workflow.verdict.held_out import HeldOut, HeldOutLight
 from nearfar.workflow.verdict.repeats import photos_with_noise
@@ -82,6 +82,7 @@ def _compare(
     black = block.black.reshape(size)[usable]
     of_white = _error_of_white(bars, photos, usable, rows)
     shown, variance = of_bands(lambda one: _weighed(photos, lights, one), rows)
+    expected = expected_and_unmeasured(bars, [light.light for light in lights], usable)
     found = []
     for number, light in enumerate(lights):
         both = _mean(photos, light.photos, rows)[usable] if light.has_inverse else None
@@ -94,13 +95,10 @@ def _compare(
             mean=None if both is None else both - black,
             error_of_white=of_white / 4,
         )
-        expected = unmeasured = None
-        if bars is not None:
-            expected, unmeasured = (mean_square(each, light.light, usable) for each in bars)
         # Bars and their inverses sum to white unless the camera's response bends; or the lamp
         # drifts, which nothing removes from inverse pairs.
         is_binary = photos.plan.offset != "reference"
-        found.append(HeldOutLight(light.description, is_binary, weighed, expected, unmeasured))
+        found.append(HeldOutLight(light.description, is_binary, weighed, *expected[number]))
     return found
 
 
@@ -134,7 +132,7 @@ def _error_of_white(
     """Return the mean square that the error of the picture under white is expected to have."""
     if bars is not None:
         white = np.ones(photos.plan.projector, dtype=np.float32)
-        return mean_square(bars.of_all, white, usable)
+        return mean_squares(bars.of_all, [white], usable)[0]
     if photos.plan.offset != "reference":
         # All pairs measure white, so that it has hardly any error.
         return 0.0

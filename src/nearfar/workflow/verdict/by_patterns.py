@@ -7,7 +7,7 @@ import numpy as np
 from nearfar.arrays import Booleans, Floats
 from nearfar.transport.model import Transport
 from nearfar.transport.verdict import PATTERNS_SHOWN
-from nearfar.workflow.verdict.bars import bars_of, mean_square
+from nearfar.workflow.verdict.bars import bars_of, expected_and_unmeasured
 from nearfar.workflow.verdict.held_out import HeldOut, HeldOutLight
 from nearfar.workflow.verdict.weighed_photos import compare_weighed
 
@@ -38,18 +38,16 @@ def compare_with_photos(
     black = transport.black.reshape(size)[usable]
     # A camera pixel's noise is known by its own photos.
     noise = float(np.mean(transport.noise.reshape(size)[usable].astype(np.float64) ** 2))
+    drawn = list(patterns.reshape(-1, *projector))
+    expected = expected_and_unmeasured(bars, drawn, usable)
     lights = []
     for number, description in enumerate(descriptions):
-        pattern = patterns[number].reshape(projector)
         compared = compare_weighed(
             photos[usable, :, number] - black,
-            (transport @ pattern).reshape(size)[usable],
+            (transport @ drawn[number]).reshape(size)[usable],
             level=0.0,
             white=white,
             noise=noise,
         )
-        expected = unmeasured = None
-        if bars is not None:
-            expected, unmeasured = (mean_square(each, pattern, usable) for each in bars)
-        lights.append(HeldOutLight(description, False, compared, expected, unmeasured))
+        lights.append(HeldOutLight(description, False, compared, *expected[number]))
     return HeldOut(tuple(lights), called=PATTERNS_SHOWN)

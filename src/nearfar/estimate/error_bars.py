@@ -262,7 +262,9 @@ class ErrorBars:
         def work(batch: slice) -> None:
             found[batch] = self._widening**2 * of_batch(batch)
 
-        side_by_side(work, blocks(len(found), max(1, BATCH_PIXELS // len(each))))
+        # Larger batches share more of what is solved for, and take more memory.
+        batch = min(BATCH_PIXELS, 2 * BATCH_PIXELS // len(each))
+        side_by_side(work, blocks(len(found), max(1, batch)))
         found[self._unknown] = np.inf
         by_light = np.split(found, np.cumsum([len(its) for its in flat])[:-1], axis=1)
         return [

@@ -20,7 +20,7 @@ PROCESSES = $(shell $(PYTHON) -c 'import os; print(-(-3 * len(os.sched_getaffini
 # One thread for BLAS: the processes share the work as it is.
 test: export OPENBLAS_NUM_THREADS := 1
 # Each process would compile all modules anew where it keeps none of them.
-test: export PYTHONDONTWRITEBYTECODE :=
+test docs: export PYTHONDONTWRITEBYTECODE :=
 test: $(READY)
 	$(BIN)/python -m pytest --numprocesses=$(PROCESSES) --maxprocesses=4 --dist=loadfile --no-loadscope-reorder
 

@@ -25,6 +25,7 @@ from nearfar.estimate.physical.cells import (
 )
 from nearfar.estimate.physical.kernels import Slope, enlarged, kernel
 from nearfar.estimate.physical.responses import Responses, Waves, responses
+from nearfar.estimate.physical.slants import slanted_footprints
 from nearfar.parallel import side_by_side
 from nearfar.transport.dipole import Dipole
 from nearfar.transport.direct import footprint, spread
@@ -220,12 +221,30 @@ def bodies_at(transport: Transport, seen: Booleans, boxes: Floats, waves: Waves)
 
     pixels = np.flatnonzero(grown(seen))
     rounded = centre(transport.correspondence, transport.projector)[pixels]
-    shown = responses(transport, pixels, rounded, waves, boxes[pixels])
+    shown = _shown(transport, pixels, rounded, waves, boxes)
     for number in range(1, count + 1):
         mine = labels == number
         with_outline = grown(mine)
         its = shown.of(np.searchsorted(pixels, np.flatnonzero(with_outline)))
         yield _body(transport, mine, with_outline, waves, its, finer)
+
+
+def _shown(
+    transport: Transport, pixels: Integers, rounded: Integers, waves: Waves, boxes: Floats
+) -> Responses:
+    """Return responses of camera pixels, with direct light through all of slanted footprints.
+
+    An estimate takes direct light to come from the projector pixels next to q. Of a slanted
+    footprint the rest would be taken for light under the surface.
+    """
+    shown = responses(transport, pixels, rounded, waves, boxes[pixels])
+    chosen = np.zeros(transport.camera.pixels, dtype=bool)
+    chosen[pixels] = True
+    slanted = slanted_footprints(transport, chosen)
+    mine = np.searchsorted(pixels, slanted.pixels)
+    to_direct = shown.to_direct.copy()
+    to_direct[mine] = slanted.to_waves(rounded[mine], waves)
+    return shown._replace(to_direct=to_direct)
 
 
 def _body(

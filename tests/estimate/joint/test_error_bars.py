@@ -14,17 +14,12 @@ from nearfar.estimate.joint import error_bars as error_bars_of_joint
 from nearfar.estimate.joint import estimate_jointly
 from nearfar.estimate.joint.nuisance import (
     DIRECT_PRIOR_DEVIATION,
-    SHIFT_DEVIATION,
-    common_precision,
 )
-from nearfar.illumination.frequencies import DC, far_frequencies
 from nearfar.illumination.near_basis import window_offsets
 from nearfar.illumination.pictures import standard_lights
 from nearfar.illumination.real_basis import real_basis
 from nearfar.photometry.measure import measure
 from nearfar.plan import choose_plan
-from nearfar.plan.choose_frequencies import choose_frequencies
-from nearfar.priors.component import PriorComponent
 from nearfar.priors.covariance import far_variance, near_covariance, spectral_density
 from nearfar.rigs.simulated.camera import SimulatedCamera
 from nearfar.rigs.simulated.projector import SimulatedProjector
@@ -32,140 +27,45 @@ from nearfar.rigs.simulated.rig import SimulatedRig
 from nearfar.scenes.cache import cached_scene
 from nearfar.transport import near
 from nearfar.transport.direct import footprint
-from nearfar.transport.model import Transport
-from nearfar.transport.posterior import Posterior
 from nearfar.transport.quality import Quality
 from nearfar.workflow.acquire import acquire_in_memory
+from tests.estimate.joint.dense_bars import (
+    COMPONENT,
+    LIGHT,
+    NOISE,
+    OFFSET,
+    PROJECTOR,
+    SCALE,
+    SHARE,
+    WHITE,
+    WINDOW,
+    dense_deviation,
+    in_channels,
+    prior_variance,
+    transport_at,
+    weights_of_picture,
+)
 from tests.estimate.lights_together import assert_each_light_has_its_own_errors
-
-PROJECTOR = Size(12, 16)
-WINDOW = 5
-COMPONENT = PriorComponent(1.5, 8.0, 2.0)
-NOISE, OFFSET, LIGHT, SHARE = 2e-3, 1e-3, 1.5e-3, 0.4
-SCALE, WHITE = 0.05, 0.8
-
-
-def _transport(centres, lit=True, noise=NOISE, noise_share=1.0):
-    """Build a transport of one prior component, all factors 0: error bars do not depend on them."""
-    low = [k for k in far_frequencies(Size(3, 3), PROJECTOR) if k != DC]
-    frequencies = [DC, *(k for i, k in enumerate(low) if -k not in low[:i])]
-    basis = real_basis(frequencies, PROJECTOR)
-    measured = tuple(choose_frequencies(PROJECTOR, 60, WINDOW).frequencies)
-    count = real_basis(measured, PROJECTOR).count
-    shape = (1, len(centres), 1)
-    q = centres[None].astype(np.float32)
-    return Transport(
-        projector=PROJECTOR,
-        correspondence=q if lit else np.full_like(q, np.nan),
-        direct=np.zeros(shape, np.float32),
-        near=np.zeros((*shape, WINDOW, WINDOW), np.float32),
-        far=np.zeros((*shape, basis.count), np.float32),
-        far_basis=basis,
-        black=np.zeros(shape, np.float32),
-        noise=np.full(shape, noise, np.float32),
-        posterior=Posterior(
-            prior_components=(PriorComponent(0.0, 1.0, 1.0), COMPONENT),
-            frequencies=measured,
-            multiplicity=np.random.default_rng(0).integers(1, 4, count).astype(np.float32),
-            prior_component=np.ones(shape[:2], np.uint8),
-            prior_scale=np.full(shape[:2], SCALE, np.float32),
-            white=np.full(shape, WHITE, np.float32),
-            offset_noise=np.full(shape, OFFSET, np.float32),
-            light_noise=np.full(shape, LIGHT, np.float32),
-            share_of_white=np.full(shape, SHARE, np.float32),
-            noise_share=np.full(shape, noise_share, np.float32),
-        ),
-    )
-
-
-def _in_channels(transport, factors):
-    """Repeat the only channel of a transport, times factors."""
-    posterior, factors = transport.posterior, np.asarray(factors, np.float32)
-
-    def times_factors(values, names):
-        return {n: getattr(values, n) * factors for n in names}
-
-    shares = {
-        n: getattr(posterior, n) * np.ones_like(factors) for n in ("share_of_white", "noise_share")
-    }
-    of_light = times_factors(posterior, ("white", "offset_noise", "light_noise"))
-    wide = {n: np.repeat(getattr(transport, n), len(factors), axis=2) for n in ("near", "far")}
-    return replace(
-        transport,
-        **times_factors(transport, ("direct", "black", "noise")),
-        **wide,
-        posterior=replace(posterior, **of_light, **shares),
-    )
-
-
-def _prior_variance():
-    """Prior variance of o, d and the shifts of q."""
-    return 1.0 / common_precision(np.array([[WHITE]]), np.array([[OFFSET]]), SHIFT_DEVIATION)[0, 0]
-
-
-def _dense(transport, c, ask, scale=SCALE):
-    """Posterior deviation of ask(o, white's own, d, n, f) by plain linear algebra.
-
-    `ask` holds weights of each; f is its responses to the measured patterns. Entries of n beyond
-    the border are 0.
-    """
-    posterior = transport.posterior
-    basis = real_basis(posterior.frequencies, PROJECTOR)
-    centre = transport.correspondence[0, c].astype(int)
-    on_window = basis.patterns_at(window_offsets(WINDOW) + centre)
-    s = scale * WHITE
-    ones = np.ones((basis.count, 1))
-    direct = basis.patterns[:, [centre[0] * PROJECTOR.width + centre[1]]]
-    responses = np.concatenate(
-        [ones, 0 * ones, direct, on_window, np.eye(basis.count)], axis=1
-    ).astype(np.float64)
-    prior = np.zeros((responses.shape[1], responses.shape[1]))
-    prior[0, 0] = OFFSET**2
-    prior[1, 1] = LIGHT**2 - (SHARE * OFFSET) ** 2
-    prior[2, 2] = _prior_variance()[1]
-    end = 3 + WINDOW**2
-    inside = near.inside(centre[None], WINDOW, PROJECTOR)[0]
-    both = np.outer(inside, inside)
-    prior[3:end, 3:end] = s**2 * near_covariance(COMPONENT, WINDOW, PROJECTOR) * both
-    prior[end:, end:] = s**2 * np.diag(far_variance(basis, COMPONENT))
-    noise = np.diag(NOISE**2 / posterior.multiplicity.astype(np.float64))
-    gain = prior @ responses.T @ np.linalg.inv(responses @ prior @ responses.T + noise)
-    posterior = prior - gain @ responses @ prior
-    return np.sqrt(ask @ posterior @ ask)
-
-
-def _weights(transport, c, light, *, far_only_held=True):
-    """Weights of o, white's own error, d, n and f's responses in the picture under a light."""
-    basis = real_basis(transport.posterior.frequencies, PROJECTOR)
-    held = np.array([basis.frequencies[i] in transport.far_basis.frequencies for i in basis.index])
-    mean = light.mean()
-    centre = transport.correspondence[:, c].astype(int)
-    seen = near.look_up(light, centre, WINDOW, PROJECTOR)[0]
-    inside = near.inside(centre, WINDOW, PROJECTOR)[0]
-    return np.concatenate(
-        [
-            [-SHARE * mean, mean, light[tuple(centre[0])] - mean],
-            seen - mean * inside,
-            basis.analyse(light.ravel()) * held,
-        ]
-    )
 
 
 def test_a_picture_is_as_uncertain_as_dense_algebra_says():
     centres = np.array([[6, 8], [5, 7], [2, 13]])
-    transport = _transport(centres)
+    transport = transport_at(centres)
     light = _held_light(transport)
     found = ErrorBars(transport).picture(light)
-    expected = [_dense(transport, c, _weights(transport, c, light)) for c in range(len(centres))]
+    expected = [
+        dense_deviation(transport, c, weights_of_picture(transport, c, light))
+        for c in range(len(centres))
+    ]
     np.testing.assert_allclose(found[0], expected, rtol=2e-3)
 
 
 @pytest.mark.parametrize("place", [(6, 8), (1, 14)])
 def test_noise_that_neighbours_take_off_is_left_out_of_near_and_far_alone(place):
     def bars_of(noise, share):
-        return ErrorBars(_transport(np.array([place]), noise=noise, noise_share=share))
+        return ErrorBars(transport_at(np.array([place]), noise=noise, noise_share=share))
 
-    light = _held_light(_transport(np.array([place])))
+    light = _held_light(transport_at(np.array([place])))
     noise, share = 20 * NOISE, 0.5
     of_all = noise, 1.0
     of_less = noise, share
@@ -192,7 +92,7 @@ def test_entries_beyond_the_border_are_known_to_be_none():
     # The estimate rounds variance ratios to powers of 2 there.
     scale = np.sqrt(512) * NOISE / WHITE
     centres = np.array([[0, 8], [6, 15], [1, 14], [11, 0], [11, 0], [6, 8]])
-    transport = _transport(centres)
+    transport = transport_at(centres)
     posterior = transport.posterior
     scales = np.full_like(posterior.prior_scale, scale)
     transport = replace(transport, posterior=replace(posterior, prior_scale=scales))
@@ -200,36 +100,39 @@ def test_entries_beyond_the_border_are_known_to_be_none():
     bars = ErrorBars(transport)
     found = bars.picture(light)
     expected = [
-        _dense(transport, c, _weights(transport, c, light), scale) for c in range(len(centres))
+        dense_deviation(transport, c, weights_of_picture(transport, c, light), scale)
+        for c in range(len(centres))
     ]
     np.testing.assert_allclose(found[0], expected, rtol=2e-3)
     # One camera pixel alone, and its many entries, are no different.
     rows = bars.component_rows(slice(2, 3))
     assert np.count_nonzero(rows.near) == 4 * 4
-    count = len(_weights(transport, 2, light))
+    count = len(weights_of_picture(transport, 2, light))
     for entry, offset in enumerate(window_offsets(WINDOW)):
         y, x = centres[2] + offset
         if y < 0 or x >= PROJECTOR.width:
             continue
         one = np.zeros(count)
         one[3 + entry] = 1.0
-        expected = _dense(transport, 2, one, scale)
+        expected = dense_deviation(transport, 2, one, scale)
         assert rows.near[0, 0, y * PROJECTOR.width + x] == pytest.approx(expected, rel=5e-3)
     of_direct = np.zeros(count)
     of_direct[2] = 1.0
-    assert bars.direct()[0, 2, 0] == pytest.approx(_dense(transport, 2, of_direct, scale), rel=2e-3)
+    assert bars.direct()[0, 2, 0] == pytest.approx(
+        dense_deviation(transport, 2, of_direct, scale), rel=2e-3
+    )
     single = np.zeros(PROJECTOR)
     single[3, 12] = 1.0
-    weights = _weights(transport, 2, single)
+    weights = weights_of_picture(transport, 2, single)
     weights[2] = -1.0 / PROJECTOR.pixels
     inside = near.inside(centres[2:3], WINDOW, PROJECTOR)[0]
     weights[3 : 3 + WINDOW**2] = inside * (-1.0 / PROJECTOR.pixels)
-    expected = _dense(transport, 2, weights, scale)
+    expected = dense_deviation(transport, 2, weights, scale)
     assert rows.far[0, 0, 3 * PROJECTOR.width + 12] == pytest.approx(expected, rel=5e-3)
 
 
 def test_what_the_transport_does_not_hold_adds_its_expected_power():
-    transport = _transport(np.array([[6, 8]]))
+    transport = transport_at(np.array([[6, 8]]))
     light = np.random.default_rng(1).random(PROJECTOR)
     spectrum = np.abs(np.fft.fft2(light)) ** 2
     cycles = [np.fft.fftfreq(side) * side for side in PROJECTOR]
@@ -237,18 +140,22 @@ def test_what_the_transport_does_not_hold_adds_its_expected_power():
     unseen = spectral_density(radius, COMPONENT) * spectrum
     unseen[(np.abs(cycles[0])[:, None] <= 1) & (np.abs(cycles[1]) <= 1)] = 0.0
     extra = (SCALE * WHITE) ** 2 * unseen.sum() / PROJECTOR.pixels**2
-    expected = np.hypot(_dense(transport, 0, _weights(transport, 0, light)), np.sqrt(extra))
+    expected = np.hypot(
+        dense_deviation(transport, 0, weights_of_picture(transport, 0, light)), np.sqrt(extra)
+    )
     assert ErrorBars(transport).picture(light)[0, 0] == pytest.approx(expected, rel=2e-3)
 
 
 def test_entries_are_as_uncertain_as_dense_algebra_says():
-    transport = _transport(np.array([[6, 8]]))
+    transport = transport_at(np.array([[6, 8]]))
     bars = ErrorBars(transport)
     rows = bars.component_rows(slice(0, 1))
-    count = len(_weights(transport, 0, np.zeros(PROJECTOR)))
+    count = len(weights_of_picture(transport, 0, np.zeros(PROJECTOR)))
     of_direct = np.zeros(count)
     of_direct[2] = 1.0
-    assert bars.direct()[0, 0, 0] == pytest.approx(_dense(transport, 0, of_direct), rel=2e-3)
+    assert bars.direct()[0, 0, 0] == pytest.approx(
+        dense_deviation(transport, 0, of_direct), rel=2e-3
+    )
     at = 6 * PROJECTOR.width + 8
     assert rows.direct[0, 0, at] == pytest.approx(bars.direct()[0, 0, 0])
     assert np.count_nonzero(rows.direct) == 1
@@ -256,32 +163,32 @@ def test_entries_are_as_uncertain_as_dense_algebra_says():
         one = np.zeros(count)
         one[3 + entry] = 1.0
         place = (6 + y) * PROJECTOR.width + 8 + x
-        assert rows.near[0, 0, place] == pytest.approx(_dense(transport, 0, one), rel=5e-3)
+        assert rows.near[0, 0, place] == pytest.approx(dense_deviation(transport, 0, one), rel=5e-3)
     assert np.count_nonzero(rows.near) == WINDOW**2
     for place in (0, at, 100):
         # An entry of F: T's, without d and n themselves.
         light = np.zeros(PROJECTOR)
         light.flat[place] = 1.0
-        weights = _weights(transport, 0, light)
+        weights = weights_of_picture(transport, 0, light)
         weights[2] = -1.0 / PROJECTOR.pixels
         weights[3 : 3 + WINDOW**2] = -1.0 / PROJECTOR.pixels
-        expected = _dense(transport, 0, weights)
+        expected = dense_deviation(transport, 0, weights)
         assert rows.far[0, 0, place] == pytest.approx(expected, rel=5e-3)
 
 
 def test_camera_pixels_at_the_border_are_as_uncertain_side_by_side_as_alone():
     centres = np.array([[0, 1], [11, 3], [5, 0], [0, 1], [1, 15]])
     noise = NOISE * np.random.default_rng(2).uniform(0.3, 8.0, (1, len(centres), 2))
-    together = replace(_in_channels(_transport(centres), [1, 1]), noise=noise.astype(np.float32))
+    together = replace(in_channels(transport_at(centres), [1, 1]), noise=noise.astype(np.float32))
     light = np.random.default_rng(1).random(PROJECTOR)
     found = ErrorBars(together).picture(light)
     for c, i in np.ndindex(noise.shape[1:]):
-        alone = _transport(centres[c : c + 1], noise=noise[0, c, i])
+        alone = transport_at(centres[c : c + 1], noise=noise[0, c, i])
         np.testing.assert_allclose(found[0, c, i], ErrorBars(alone).picture(light), rtol=1e-5)
 
 
 def test_each_of_several_lights_has_its_own_errors():
-    transport = _in_channels(_transport(np.array([[6, 8], [0, 1], [5, 7], [11, 3]])), [1, 2])
+    transport = in_channels(transport_at(np.array([[6, 8], [0, 1], [5, 7], [11, 3]])), [1, 2])
     q = transport.correspondence.copy()
     q[0, 2] = np.nan
     second = np.full_like(q, np.nan)
@@ -294,7 +201,7 @@ def test_each_of_several_lights_has_its_own_errors():
 
 @pytest.mark.parametrize("lit", [True, False])
 def test_entries_are_the_same_line_by_line_and_some_at_a_time(lit, monkeypatch):
-    transport = _transport(np.array([[6, 8], [0, 1]]), lit=lit)
+    transport = transport_at(np.array([[6, 8], [0, 1]]), lit=lit)
     bars = ErrorBars(transport)
     rows = bars.component_rows(slice(0, 2))
     for pixel in range(2):
@@ -309,14 +216,14 @@ def test_entries_are_the_same_line_by_line_and_some_at_a_time(lit, monkeypatch):
 
 @pytest.mark.parametrize(("pixel", "line"), [(2, 0), (-1, 0), (0, PROJECTOR.height), (0, -1)])
 def test_what_is_not_there_has_no_error_bars(pixel, line):
-    bars = ErrorBars(_transport(np.array([[6, 8], [0, 1]])))
+    bars = ErrorBars(transport_at(np.array([[6, 8], [0, 1]])))
     with pytest.raises(InputError, match="choose one that it has"):
         bars.along(pixel, line)
 
 
 def test_an_unlit_camera_pixel_has_far_light_alone():
     centres = np.array([[6, 8], [0, 0]])
-    bars = ErrorBars(_transport(centres, lit=False))
+    bars = ErrorBars(transport_at(centres, lit=False))
     assert not bars.direct().any()
     rows = bars.component_rows(slice(0, 2))
     assert not rows.direct.any()
@@ -327,7 +234,7 @@ def test_an_unlit_camera_pixel_has_far_light_alone():
 
 
 def test_gains_scale_the_error_of_their_component():
-    transport = _transport(np.array([[6, 8], [5, 7]]))
+    transport = transport_at(np.array([[6, 8], [5, 7]]))
     bars = ErrorBars(transport)
     light = np.random.default_rng(1).random(PROJECTOR)
     direct = bars.picture(light, near=0.0, far=0.0)
@@ -340,8 +247,8 @@ def test_gains_scale_the_error_of_their_component():
 
 
 def test_colour_lights_go_channel_by_channel():
-    transport = _transport(np.array([[6, 8], [5, 7]]))
-    both = _in_channels(transport, [1, 2])
+    transport = transport_at(np.array([[6, 8], [5, 7]]))
+    both = in_channels(transport, [1, 2])
     lights = np.random.default_rng(1).random((*PROJECTOR, 2))
     found = ErrorBars(both).picture(lights)
     one, bars = ErrorBars(both), ErrorBars(transport)
@@ -352,7 +259,7 @@ def test_colour_lights_go_channel_by_channel():
 
 def test_q_between_pixels_is_as_uncertain_as_dense_algebra_says():
     part = 0.4
-    transport = _transport(np.array([[6.0, 8.0 + part]]))
+    transport = transport_at(np.array([[6.0, 8.0 + part]]))
     posterior = transport.posterior
     basis = real_basis(posterior.frequencies, PROJECTOR)
     at = 6 * PROJECTOR.width + 8
@@ -363,7 +270,7 @@ def test_q_between_pixels_is_as_uncertain_as_dense_algebra_says():
     end = 3 + WINDOW**2
     s = SCALE * WHITE
     prior = np.zeros((responses.shape[1], responses.shape[1]))
-    prior[:3, :3] = np.diag(_prior_variance()[:3])
+    prior[:3, :3] = np.diag(prior_variance()[:3])
     prior[3:end, 3:end] = s**2 * near_covariance(COMPONENT, WINDOW, PROJECTOR)
     prior[end:, end:] = s**2 * np.diag(far_variance(basis, COMPONENT))
     noise = np.diag(NOISE**2 / posterior.multiplicity.astype(np.float64))
@@ -371,7 +278,7 @@ def test_q_between_pixels_is_as_uncertain_as_dense_algebra_says():
     posterior = prior - gain @ responses @ prior
     light = np.zeros(PROJECTOR)
     light[:, 9:] = 1.0
-    weights = _weights(transport, 0, light)
+    weights = weights_of_picture(transport, 0, light)
     # White's own error stands apart: nothing else tells of it.
     ask = np.concatenate([weights[:1], [part - light.mean(), 1.0], weights[3:]])
     own_of_white = LIGHT**2 - (SHARE * OFFSET) ** 2
@@ -387,7 +294,7 @@ def test_q_between_pixels_is_as_uncertain_as_dense_algebra_says():
 
 def test_a_second_place_is_as_uncertain_as_dense_algebra_says():
     second, of_light = (2.4, 13.7), 0.2
-    transport = _transport(np.array([[6, 8]]))
+    transport = transport_at(np.array([[6, 8]]))
     transport = replace(
         transport,
         second_place=np.array([[second]], np.float32),
@@ -416,7 +323,7 @@ def test_a_second_place_is_as_uncertain_as_dense_algebra_says():
     prior = np.zeros((responses.shape[1], responses.shape[1]))
     shift = error_bars_of_joint.SECOND_SHIFT * of_light
     prior[:5, :5] = np.diag(
-        [*_prior_variance()[:2], (DIRECT_PRIOR_DEVIATION * WHITE) ** 2, shift**2, shift**2]
+        [*prior_variance()[:2], (DIRECT_PRIOR_DEVIATION * WHITE) ** 2, shift**2, shift**2]
     )
     prior[5:end, 5:end] = s**2 * near_covariance(COMPONENT, WINDOW, PROJECTOR)
     prior[end:, end:] = s**2 * np.diag(far_variance(basis, COMPONENT))
@@ -424,7 +331,7 @@ def test_a_second_place_is_as_uncertain_as_dense_algebra_says():
     gain = prior @ responses.T @ np.linalg.inv(responses @ prior @ responses.T + noise)
     posterior = prior - gain @ responses @ prior
     light = _held_light(transport)
-    weights = _weights(transport, 0, light)
+    weights = weights_of_picture(transport, 0, light)
     of_second = at_second(light.reshape(-1, 1))[:, 0]
     of_second[0] -= light.mean()
     # White's own error stands apart: nothing else tells of it.
@@ -433,11 +340,11 @@ def test_a_second_place_is_as_uncertain_as_dense_algebra_says():
     expected = np.sqrt(ask @ posterior @ ask + light.mean() ** 2 * own_of_white)
     found = ErrorBars(transport).picture(light)[0, 0]
     assert found == pytest.approx(error_bars_of_joint.SECOND_WIDENING * expected, rel=2e-3)
-    assert found > 1.05 * ErrorBars(_transport(np.array([[6, 8]]))).picture(light)[0, 0]
+    assert found > 1.05 * ErrorBars(transport_at(np.array([[6, 8]]))).picture(light)[0, 0]
 
 
 def test_nothing_is_known_of_saturated_camera_pixels():
-    transport = _transport(np.array([[5.0, 7.0], [3.0, 4.0]]))
+    transport = transport_at(np.array([[5.0, 7.0], [3.0, 4.0]]))
     known, light = ErrorBars(transport), np.random.default_rng(0).random(PROJECTOR)
     saturated = np.array([[False, True]])
     quality = Quality(np.ones((1, 2), np.float32), saturated)
@@ -452,15 +359,15 @@ def test_nothing_is_known_of_saturated_camera_pixels():
         assert np.isinf(row[1]).all()
         np.testing.assert_array_equal(row[0].reshape(-1, *PROJECTOR)[:, 4], before)
     # No NaN, also where there is no direct light.
-    dark = replace(_transport(np.array([[5.0, 7.0], [3.0, 4.0]]), lit=False), quality=quality)
+    dark = replace(transport_at(np.array([[5.0, 7.0], [3.0, 4.0]]), lit=False), quality=quality)
     assert np.isinf(ErrorBars(dark).direct()[0, 1]).all()
 
 
 def test_a_transport_without_posterior_says_so():
-    transport = replace(_transport(np.array([[6, 8]])), posterior=None)
+    transport = replace(transport_at(np.array([[6, 8]])), posterior=None)
     with pytest.raises(InputError, match="`method='joint'`"):
         ErrorBars(transport)
-    assert _transport(np.array([[6, 8]])).with_gains(near=2.0).posterior is None
+    assert transport_at(np.array([[6, 8]])).with_gains(near=2.0).posterior is None
 
 
 def _within(error, deviation):

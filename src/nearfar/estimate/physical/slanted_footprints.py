@@ -39,12 +39,8 @@ def with_slanted_footprints(split: PhysicalSplit) -> PhysicalSplit:
     slanted = slanted_footprints(transport, opaque(split).ravel())
     if not len(slanted.pixels):
         return split
-    share = _share_found(slanted)
     lost_of_found = np.zeros(transport.camera.pixels)
-    # Of a q beyond the projector's border nothing may be found.
-    lost_of_found[slanted.pixels] = np.divide(
-        1 - share, share, out=np.zeros_like(share), where=share > 0
-    )
+    lost_of_found[slanted.pixels] = 1 / _share_found(slanted) - 1
     chosen = np.zeros(transport.camera.pixels, dtype=bool)
     chosen[slanted.pixels] = True
     lost = np.maximum(lost_of_found, 0.0).reshape(transport.camera)[..., None] * split.direct

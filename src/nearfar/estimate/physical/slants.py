@@ -22,7 +22,7 @@ REACH = 3
 
 
 class SlantedFootprints(NamedTuple):
-    """Footprints of camera pixels that see two projector pixels or more slantwise.
+    """Footprints that are wider or higher than a projector pixel.
 
     Attributes
     ----------
@@ -59,9 +59,7 @@ class SlantedFootprints(NamedTuple):
             covered += np.clip(along, 0.0, None).prod(axis=-1)
             within = np.minimum(high, edges) - np.maximum(low, -0.5)
             inside += np.clip(within, 0.0, None).prod(axis=-1)
-        return np.divide(
-            covered, inside[:, None], out=np.zeros_like(covered), where=inside[:, None] > 0
-        )
+        return np.asarray(covered / inside[:, None])
 
     def to_waves(self, rounded: Integers, waves: Waves) -> Complexes:
         """Return the responses of unit direct light to waves, (n, k), complex.
@@ -81,12 +79,14 @@ class SlantedFootprints(NamedTuple):
 def slanted_footprints(transport: Transport, chosen: Booleans) -> SlantedFootprints:
     """Return the slanted footprints of chosen camera pixels, (C,).
 
-    Camera pixels whose footprint the transport has as boxes are not among them.
+    Camera pixels whose footprint the transport has as boxes are not among them, nor those whose q
+    lies beyond the projector.
     """
     boxes = seen_of_projector(transport.correspondence)
     extent = (boxes[:, :2] + 2 * np.abs(boxes[:, 2:])).max(axis=1)
     known = transport.boxes.any(axis=1)
-    slanted = chosen & ~known & (extent >= LEAST_EXTENT) & (extent <= LARGEST_EXTENT)
-    pixels = np.flatnonzero(slanted)
     q = transport.correspondence.reshape(-1, 2)
+    lit = np.all((q >= -0.5) & (q <= np.array(transport.projector) - 0.5), axis=1)
+    slanted = chosen & lit & ~known & (extent >= LEAST_EXTENT) & (extent <= LARGEST_EXTENT)
+    pixels = np.flatnonzero(slanted)
     return SlantedFootprints(pixels, q[pixels], boxes[pixels], transport.projector)

@@ -9,25 +9,21 @@ Index convention: c runs over camera pixels on bodies.
 """
 
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
-from nearfar.arrays import Booleans, Floats, Integers
-from nearfar.estimate.physical.around import steps
+from nearfar.arrays import Floats
 from nearfar.estimate.physical.error_bars import (
     at_q_of_kernels,
     finite,
     root_left,
     taken_by_boxes,
 )
+from nearfar.estimate.physical.local_fits import planes_about
 from nearfar.estimate.physical.split import DARK, PhysicalSplit, on_bodies, with_more_direct
 
-# Camera pixels on each side that a plane goes through, and how many of them there are at least.
-REACH, LEAST_TELLING = 2, 6
-# Weight of a plane's squared slope for each camera pixel that it is fitted to: at outlines, camera
-# pixels on one side alone tell little of a slope.
-LEVEL = 0.5
+# Camera pixels on bodies that a plane goes through, at least.
+LEAST_TELLING = 6
 # Standard deviations by which neighbours are let err apart. Over the root of the share that kernels
 # leave: of direct light, times what kernels add at q; of subsurface light, times itself. At least:
 # as shares of the same. And of the estimate's own standard deviation of direct light.
@@ -40,24 +36,6 @@ CORRELATION = -0.65
 # How these were chosen: docs/decisions/0110.
 APART = 0.2
 TINY = float(np.finfo(np.float64).tiny)
-
-
-class _Planes(NamedTuple):
-    """Planes through the shares of the camera pixels around each.
-
-    Attributes
-    ----------
-    value : ndarray, shape (c, channels)
-        At the camera pixel.
-    left : ndarray, shape (c,)
-        Sum of the squared distances of the others from it, mean over channels.
-    number : ndarray, shape (c,)
-        How many others there are.
-    """
-
-    value: Floats
-    left: Floats
-    number: Floats
 
 
 def with_smooth_bodies(split: PhysicalSplit, deviation: Floats) -> PhysicalSplit:
@@ -82,11 +60,11 @@ def with_smooth_bodies(split: PhysicalSplit, deviation: Floats) -> PhysicalSplit
     white = np.ones(transport.projector, dtype=np.float32)
     parts = np.stack([np.reshape(part, shape) for part in split.components(white)])
     total = np.maximum(parts.sum(axis=0), DARK)
-    of_direct, of_under = _variances(split, deviation, parts[1])
+    of_direct, of_under = variances_apart(split, deviation, parts[1])
     noise = of_direct + of_under + 2 * CORRELATION * np.sqrt(of_direct * of_under)
     noise = (noise / total**2).mean(axis=1)[pixels]
     share = parts[2] / total
-    planes = _planes(share.reshape(*transport.camera, -1), seen, pixels)
+    planes = planes_about(share.reshape(*transport.camera, -1), seen, pixels)
     apart = share[pixels] - planes.value
     scatter = (planes.left + (apart**2).mean(axis=1)) / (planes.number + 1)
     lost = np.minimum(APART * noise / np.maximum(scatter, TINY), 1.0)
@@ -104,8 +82,24 @@ def with_smooth_bodies(split: PhysicalSplit, deviation: Floats) -> PhysicalSplit
     return with_more_direct(split, (to_direct * change).reshape(transport.direct.shape))
 
 
-def _variances(split: PhysicalSplit, deviation: Floats, under: Floats) -> tuple[Floats, Floats]:
-    """Return variances of direct and of subsurface light under white, (C, channels)."""
+def variances_apart(
+    split: PhysicalSplit, deviation: Floats, under: Floats
+) -> tuple[Floats, Floats]:
+    """Return by how much neighbours are let err apart.
+
+    Parameters
+    ----------
+    split : PhysicalSplit
+    deviation : ndarray, shape (Cy, Cx, channels)
+        As for `with_smooth_bodies`.
+    under : ndarray, shape (C, channels)
+        Subsurface light under white.
+
+    Returns
+    -------
+    of_direct, of_under : ndarray, shape (C, channels)
+        Variances of direct and of subsurface light under white; 0 where no body is seen.
+    """
     of_direct, of_under = np.zeros(under.shape), np.zeros(under.shape)
     of_estimate = finite(deviation).reshape(under.shape)
     for body in split.bodies:
@@ -115,27 +109,3 @@ def _variances(split: PhysicalSplit, deviation: Floats, under: Floats) -> tuple[
         share = np.hypot(OF_SUBSURFACE * left, LEAST_OF_SUBSURFACE)
         of_under[pixels] = (share * under[pixels]) ** 2 + taken**2
     return of_direct, of_under
-
-
-def _planes(share: Floats, seen: Booleans, pixels: Integers) -> _Planes:
-    """Fit planes to shares (Cy, Cx, channels) of camera pixels that are seen on bodies."""
-    channels, width = share.shape[2], seen.shape[1] + 2 * REACH
-    border = (REACH, REACH)
-    values = np.pad(np.where(seen[..., None], share, 0.0), (border, border, (0, 0)))
-    values, telling = values.reshape(-1, channels), np.pad(seen, REACH).ravel()
-    y, x = np.divmod(pixels, seen.shape[1])
-    normal = np.zeros((len(pixels), 3, 3))
-    of_shares, squares = np.zeros((len(pixels), 3, channels)), np.zeros((len(pixels), channels))
-    for down, across in steps(REACH):
-        other = (y + REACH + down) * width + x + REACH + across
-        terms = np.array([1.0, down, across])
-        normal += telling[other, None, None] * np.outer(terms, terms)
-        of_shares += terms[:, None] * values[other, None]
-        squares += values[other] ** 2
-    number = normal[:, 0, 0]
-    # Where there is none, a plane of 0 solves the equations.
-    level = (LEVEL * number)[:, None, None] * np.diag([0.0, 1.0, 1.0])
-    level += (number == 0)[:, None, None] * np.eye(3)
-    plane = np.linalg.solve(normal + level, of_shares)
-    left = squares - (plane * (2 * of_shares - normal @ plane)).sum(axis=1)
-    return _Planes(plane[:, 0], np.maximum(left, 0.0).mean(axis=1), number)

@@ -14,6 +14,7 @@ from nearfar.estimate.physical.creases import settled
 from nearfar.estimate.physical.dark_creases import without_dark_creases
 from nearfar.estimate.physical.elsewhere import at_second_places
 from nearfar.estimate.physical.footprints import footprints
+from nearfar.estimate.physical.guided_direct import with_guided_direct_light
 from nearfar.estimate.physical.holes import without_holes
 from nearfar.estimate.physical.kernels import enlarged
 from nearfar.estimate.physical.least_interreflection import with_least_interreflection
@@ -109,7 +110,7 @@ def split_physically(transport: Transport) -> PhysicalSplit:
     # Without error bars nothing says how much of inter-reflection is noise.
     if transport.posterior is not None:
         deviation = ErrorBars(transport).direct()
-        split = with_smooth_bodies(split, deviation)
+        split = with_guided_direct_light(with_smooth_bodies(split, deviation), deviation)
         split = with_smooth_interreflection(split, deviation, near_creases)
     return with_crease_light(with_least_interreflection(split), near_creases)
 

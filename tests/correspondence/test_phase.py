@@ -1,6 +1,7 @@
 """Correspondence by phase: exact, robust under global light, honest where there is none."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -137,6 +138,25 @@ def test_a_coarse_camera_pixel_gets_the_centroid():
     found = correspond_by_phase(coarse, pitch=1)
     assert found.lit.all()
     np.testing.assert_allclose(found.q, q, atol=0.25)
+
+
+def test_light_under_a_surface_moves_no_q_to_one_side():
+    camera = Size(16, 20)
+    generator = np.random.default_rng(5)
+    place = generator.uniform(4, np.array(PROJECTOR) - 5, size=(camera.pixels, 2))
+    y, x = np.meshgrid(*(np.arange(side) for side in PROJECTOR), indexing="ij")
+    down, across = (along.ravel() - q[:, None] for along, q in zip((y, x), place.T, strict=True))
+    direct = np.clip(1 - np.abs(down), 0, None) * np.clip(1 - np.abs(across), 0, None)
+    under = np.exp(-np.hypot(down, across) / 1.5)
+    rows = 0.4 * direct + 0.6 * under / under.sum(axis=1, keepdims=True)
+    world = SimpleNamespace(
+        projector=PROJECTOR, camera=camera, channels=1, rows=lambda _: rows[:, None]
+    )
+    found = correspond_by_phase(_responses(world, FEW, noise=1e-3), pitch=1)
+    assert found.lit.all()
+    off = found.q.reshape(-1, 2) - place
+    assert np.abs(off.mean(axis=0)).max() < 0.01
+    assert np.sqrt(np.mean(off**2)) < 0.05
 
 
 def test_photos_of_a_noisy_camera_move_nothing_by_half_a_pixel(shoot):

@@ -14,7 +14,7 @@ frequencies may lie off the DFT grid. On projectors too large for that, and wher
 are high, places are searched for from coarse to fine (`nearfar.correspondence.coarse_to_fine`).
 
 Index convention: c runs over camera pixels, r over real responses, k over frequencies, g over
-frequencies of one fy, o and i over the offsets of a footprint.
+frequencies of one fy.
 """
 
 from collections.abc import Callable
@@ -23,7 +23,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from nearfar.arrays import Booleans, Floats, Integers, blocks
+from nearfar.arrays import Floats, Integers, blocks
 from nearfar.correspondence.ambiguity import require_settled
 from nearfar.correspondence.background import (
     DETECTION_BACKGROUND,
@@ -35,9 +35,9 @@ from nearfar.correspondence.coarse_to_fine import (
     correspond_coarse_to_fine,
     rows_beside,
 )
+from nearfar.correspondence.entries import entries_about, places_among
 from nearfar.correspondence.methods import CorrespondenceMethod
 from nearfar.correspondence.neighbours import REACH
-from nearfar.correspondence.nonnegative import nonnegative_entries
 from nearfar.correspondence.orientation import is_mirrored
 from nearfar.correspondence.result import Correspondence
 from nearfar.correspondence.sidelobes import replace_sidelobes
@@ -60,11 +60,6 @@ from nearfar.plan.patterns import Sinusoid
 SCORES_AT_ONCE = 2**22
 # Camera pixels at once.
 PIXELS_AT_ONCE = 1024
-# Pixels on each side of the middle of a footprint.
-FOOTPRINT_REACH = 2
-# Ridge on a footprint's entries two pixels from its middle, in units of the diagonal: a second
-# pixel of direct light is more probable next to the first.
-OUTER_RIDGE = 1.0
 # Least root mean square over the responses of what direct light explains, in deviations of the
 # background, for it to be seen. It lies between the 98th percentile of unlit and the 0.05th of lit
 # camera pixels of a Cornell box seen from aside, by plans of 79 to 340 photos
@@ -89,7 +84,7 @@ def correspond_by_phase(measurements: Measurements, *, pitch: int) -> Correspond
     Returns
     -------
     Correspondence
-        q is the centroid of the direct light within 2 pixels of its peak: where one camera pixel
+        q is the centroid of the direct light within a pixel or so of it: where one camera pixel
         sees two surfaces, that of the stronger. NaN where no direct light stands above near-range
         light; where q is mirrored it must stand further above. Confidence is 1/2 at this
         threshold.
@@ -128,8 +123,10 @@ def _correspond_at_every_place(
         relative = division.of_pixels(pixels)
         if around is None:
             around = _search(basis, waves, weigh(basis, relative, SEARCH_BACKGROUND))
-        q[pixels], _ = _footprints(basis, weigh(basis, relative, FOOTPRINT_BACKGROUND), around)
-        _, excess[pixels] = _footprints(basis, weigh(basis, relative, DETECTION_BACKGROUND), around)
+        seen = entries_about(basis, weigh(basis, relative, FOOTPRINT_BACKGROUND), around)
+        q[pixels] = np.clip(places_among(seen, around), 0, np.array(basis.projector) - 1)
+        detected = entries_about(basis, weigh(basis, relative, DETECTION_BACKGROUND), around)
+        excess[pixels] = detected.excess
 
     side_by_side(place, blocks(camera.pixels, PIXELS_AT_ONCE))
     lit = (excess > LEAST_EXCESS).reshape(camera)
@@ -243,43 +240,6 @@ def _highest(basis: RealBasis, score: Floats, weights: Floats) -> NDArray[np.flo
     last = last[deviation[last] > (peak / whole)[pixel[last]]]
     found[pixel[last]] = np.concatenate(places)[last]
     return found
-
-
-def _footprints(
-    basis: RealBasis, weighed: Weighed, around: NDArray[np.float64]
-) -> tuple[Floats, Floats]:
-    """Fit the entries of t around a place, none negative.
-
-    Returns
-    -------
-    centroid : ndarray, shape (C, 2)
-    excess : ndarray, shape (C,)
-        Root mean square over the responses of what the footprint explains, in deviations of the
-        background.
-    """
-    limit = np.array(basis.projector) - 1
-    offsets = _square(FOOTPRINT_REACH)
-    centre = np.clip(np.floor(around + 0.5).astype(np.int64), 0, limit)
-    # Two entries overlap by a sum that depends on the offset between them alone.
-    steps = _square(2 * FOOTPRINT_REACH)
-    overlap = np.cos(2 * np.pi * (basis.cycles @ steps.T)).astype(np.float32)
-    apart = offsets[:, None] - offsets[None] + 2 * FOOTPRINT_REACH
-    number = apart[..., 0] * (4 * FOOTPRINT_REACH + 1) + apart[..., 1]
-    ridge = np.where(np.abs(offsets).max(axis=1) > 1, OUTER_RIDGE, 0.0).astype(np.float32)
-    places = offsets[:, None] + centre
-    inside: Booleans = np.all((places >= 0) & (places <= limit), axis=-1)
-    phase_shifted = basis.recentre(weighed.responses[:, None], centre)[:, 0]
-    scores = np.ascontiguousarray((phase_shifted @ basis.patterns_at(offsets)).T)
-    gram = (overlap.T @ weighed.weights.T)[number]
-    entries, explained = nonnegative_entries(scores, gram, inside, ridge)
-    total = entries.sum(axis=0)
-    centroid = centre + (entries.T @ offsets) / np.where(total > 0, total, 1.0)[:, None]
-    return np.clip(centroid, 0, limit), np.sqrt(np.maximum(explained, 0.0) / basis.count)
-
-
-def _square(reach: int) -> NDArray[np.int64]:
-    side = np.arange(-reach, reach + 1)
-    return np.stack(np.meshgrid(side, side, indexing="ij"), axis=-1).reshape(-1, 2)
 
 
 def _find(

@@ -20,6 +20,10 @@ from nearfar.transport.direct import direct_weights
 LARGEST_SHIFT = 0.25
 # The same where footprints are boxes, whose responses are not linear in q.
 LARGEST_SHIFT_AT_PITCH = 0.12
+# Near-range light next to q looks like a small error of q, which correspondence knows better. Where
+# it is more than this share of direct light, q is shifted by this distance at least, or not at all:
+# windows of single projector pixels have what q does not reach (docs/decisions/0123).
+LEAST_NEAR_SHARE, LEAST_SHIFT = 0.1, 0.1
 LARGEST_FROM_CENTRE = 0.499
 
 
@@ -39,6 +43,10 @@ def moved_q(problem: Problem, rows: EstimatedRows, lit: Booleans, *, is_last: bo
     lowest = xp.clip(centres - most, min=0.0)
     highest = xp.minimum(centres + most, last)
     moved: Floats = xp.maximum(xp.minimum(pixels.correspondence + off, highest), lowest)
+    if problem.near_basis.pitch == 1:
+        is_small = xp.max(xp.abs(moved - pixels.correspondence), axis=-1) < LEAST_SHIFT
+        stays = is_small & _is_beside_near_range_light(problem, rows)
+        moved = xp.where(stays[:, None], pixels.correspondence, moved)
     seen: Floats = xp.where(lit[:, None], moved, xp.nan)
     return seen
 
@@ -72,6 +80,16 @@ def with_unshifted_light(problem: Problem, moved: Floats, rows: EstimatedRows) -
     light = lost @ xp.astype(derivatives, xp.float64)
     windows[..., beside(around, windows)] += xp.astype(light, windows.dtype)
     return rows._replace(near=windows)
+
+
+def _is_beside_near_range_light(problem: Problem, rows: EstimatedRows) -> Booleans:
+    """Return whether there is near-range light next to q, (C,)."""
+    xp = namespace(rows.near)
+    around = around_q(problem.near_basis.window)
+    next_to_q = xp.sum(rows.near[..., beside(around, rows.near)], axis=1)
+    light = xp.sum(xp.abs(next_to_q), axis=-1)
+    found: Booleans = light > LEAST_NEAR_SHARE * xp.abs(xp.sum(rows.amplitudes[..., 1], axis=1))
+    return found
 
 
 def _errors_of_q(rows: EstimatedRows) -> Floats:

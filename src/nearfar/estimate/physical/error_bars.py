@@ -29,8 +29,8 @@ from nearfar.estimate.physical.translucent import SQUARE
 # Standard deviations at translucent surfaces, over the root of the share that kernels leave: of
 # direct light, times what kernels add at q; of subsurface light, times itself; of inter-reflection,
 # times subsurface light, and times itself. These and the next three were measured on nine scenes
-# (docs/decisions/0118).
-OF_DIRECT, OF_SUBSURFACE = 0.62, 0.34
+# (docs/decisions/0118, 0123).
+OF_DIRECT, OF_SUBSURFACE = 0.5, 0.34
 BY_SUBSURFACE, OF_INTERREFLECTION = 0.155, 1.0
 # Of inter-reflection's, that root counts as much at least.
 LEAST_ROOT_LEFT = 0.08

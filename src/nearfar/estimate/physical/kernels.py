@@ -1,7 +1,7 @@
 """Light under a surface as a kernel over projector pixels.
 
 A kernel is the dipole of Jensen et al. (2001), integrated over the projector pixel that is lit and
-over an area as large about the place that is seen. On a slanted surface the distance between two
+over a smaller area about the place that is seen. On a slanted surface the distance between two
 places is longer along the slope than on the projector: |r|^2 + (g . r)^2, where g is the slope of
 depth, in projector pixels a projector pixel.
 """
@@ -19,6 +19,10 @@ from nearfar.transport.dipole import Dipole, boundary_mismatch, diffuse_profile
 REFRACTIVE_INDEX = 1.4
 # Samples of a projector pixel on each side.
 SAMPLES = 5
+# Side of the area that is seen, in projector pixels. An estimate takes some of the fastest waves of
+# light under a surface for direct light. With a whole projector pixel, sources that are too deep
+# fit that, and direct light is too bright (docs/decisions/0123).
+SEEN_SIDE = 0.71
 
 Slope = tuple[float, float]
 FLAT: Slope = (0.0, 0.0)
@@ -93,9 +97,11 @@ def _squared_distances(radius: int, slope: Slope, samples: int) -> Floats:
 
 @lru_cache(maxsize=4)
 def _over_pixels(radius: int, samples: int) -> Floats:
-    """Return weights of samples in integrals over both pixels, one dimension; (2 radius + 1, n)."""
+    """Return weights of samples in integrals over both areas along an axis, (2 radius + 1, n)."""
     pixel = np.full(samples, 1 / samples)
-    both = np.convolve(pixel, pixel)
+    from_middle = np.abs(np.arange(samples) - (samples - 1) / 2)
+    seen = np.clip(SEEN_SIDE * samples / 2 - from_middle + 0.5, 0.0, 1.0)
+    both = np.convolve(pixel, seen / seen.sum())
     weights = np.zeros((2 * radius + 1, 2 * (radius + 1) * samples + 1))
     for number, row in enumerate(weights):
         first = number * samples + 1

@@ -4,8 +4,8 @@ The sum of direct and subsurface light is told far better than either: what one 
 other lacks, in each camera pixel by itself. That shows as speckle in both. All light of a camera
 pixel has no speckle, but has the edges of textures and shadows. What direct light deviates by from
 planes and a multiple of all light around goes to subsurface light, as far as error bars explain it.
-On average over camera pixels around nothing goes: dark camera pixels, which are less sure, would
-gain direct light.
+The mean of these changes over the camera pixels around is taken off again: dark camera pixels,
+which are less sure, would gain direct light that no other one loses.
 """
 
 from dataclasses import replace

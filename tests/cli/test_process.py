@@ -117,6 +117,37 @@ def _wait_for_photo(process: subprocess.Popen[str], unfinished: Path, number: in
         time.sleep(0.01)
 
 
+# What sends a signal to stop as `sends` is deleted.
+DELETED = {
+    "__del__": """\
+class Sends:
+    def __del__(self):
+        os.kill(os.getpid(), signal.SIGTERM)
+sends = Sends()""",
+    "a weak reference": """\
+class Sends: pass
+sends = Sends()
+weakref.finalize(sends, os.kill, os.getpid(), signal.SIGTERM)""",
+}
+
+
+@pytest.mark.parametrize("how", DELETED)
+def test_an_interrupt_while_something_is_deleted_is_not_lost(how: str):
+    """Python ignores what is raised there."""
+    script = (
+        "import os, signal, time, weakref\n"
+        "from nearfar.cli.faults import stopped_cleanly\n"
+        f"{DELETED[how]}\n"
+        "with stopped_cleanly():\n"
+        "    try:\n"
+        "        del sends\n"
+        f"        time.sleep({LONGEST_WAIT})\n"
+        "    except KeyboardInterrupt: print('stopped')\n"
+    )
+    ran = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert (ran.stdout, ran.stderr) == ("stopped\n", "")
+
+
 @pytest.mark.parametrize("stop", STOP_SIGNALS)
 def test_an_interrupted_capture_keeps_its_photos(long_job, tmp_path: Path, stop: signal.Signals):
     plan, rig = long_job

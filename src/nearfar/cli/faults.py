@@ -19,6 +19,10 @@ from nearfar.cli.saying import warn
 from nearfar.cli.stopping import handled_by
 from nearfar.errors import KeptInterrupt, NearfarError
 
+# Modules whose callbacks are called as objects are deleted.
+WEAK_REFERENCES = ("_weakrefset", "weakref")
+# Seconds after which a signal to stop is raised that would have been ignored.
+LATER = 0.01
 # Signals to stop that arrived while the command ran.
 _stops: list[int] = []
 
@@ -81,15 +85,38 @@ def warnings_in_lines() -> Iterator[None]:
 
 @contextmanager
 def stopped_cleanly() -> Iterator[None]:
-    """Raise KeyboardInterrupt on signals to stop, for the command to remove half-written files."""
+    """Raise KeyboardInterrupt on signals to stop, for the command to remove half-written files.
 
-    def stop(number: int, _frame: FrameType | None) -> NoReturn:
+    Where Python would ignore it, a little later.
+    """
+
+    def stop(number: int, frame: FrameType | None) -> None:
         _stops.append(number)
-        raise KeyboardInterrupt
+        raise_or_wait(frame)
+
+    def raise_or_wait(frame: FrameType | None) -> None:
+        if not _is_ignored_in(frame):
+            raise KeyboardInterrupt
+        signal.setitimer(signal.ITIMER_REAL, LATER)
 
     _stops.clear()
-    with handled_by(stop):
-        yield
+    usual = signal.signal(signal.SIGALRM, lambda _, frame: raise_or_wait(frame))
+    try:
+        with handled_by(stop):
+            yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, usual)
+
+
+def _is_ignored_in(frame: FrameType | None) -> bool:
+    """Return whether Python ignores what is raised, as it does while objects are deleted."""
+    while frame is not None:
+        module = frame.f_globals.get("__name__")
+        if frame.f_code.co_name == "__del__" or module in WEAK_REFERENCES:
+            return True
+        frame = frame.f_back
+    return False
 
 
 def _interrupted(stopped: KeyboardInterrupt | None = None) -> NoReturn:

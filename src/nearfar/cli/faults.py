@@ -95,9 +95,11 @@ def stopped_cleanly() -> Iterator[None]:
         raise_or_wait(frame)
 
     def raise_or_wait(frame: FrameType | None) -> None:
-        if not _is_ignored_in(frame):
+        is_ignored = _is_ignored_in(frame)
+        # One signal after another is raised once, and not again while files are removed.
+        signal.setitimer(signal.ITIMER_REAL, LATER if is_ignored else 0)
+        if not is_ignored:
             raise KeyboardInterrupt
-        signal.setitimer(signal.ITIMER_REAL, LATER)
 
     _stops.clear()
     usual = signal.signal(signal.SIGALRM, lambda _, frame: raise_or_wait(frame))

@@ -12,10 +12,12 @@ from nearfar.arrays import Booleans, Floats, Integers
 from nearfar.correspondence.centroids import centroids
 from nearfar.correspondence.nonnegative import nonnegative_entries
 from nearfar.correspondence.weighing import Weighed
+from nearfar.illumination.near_basis import window_offsets
 from nearfar.illumination.real_basis import RealBasis
 
 # Pixels on each side of the middle of a footprint.
 FOOTPRINT_REACH = 2
+SIDE = 2 * FOOTPRINT_REACH + 1
 # Ridge on a footprint's entries two pixels from its middle, in units of the diagonal: a second
 # pixel of direct light is more probable next to the first.
 OUTER_RIDGE = 1.0
@@ -64,10 +66,10 @@ def entries_about(basis: RealBasis, weighed: Weighed, around: NDArray[np.float64
     Entries
     """
     limit = np.array(basis.projector) - 1
-    offsets = _square(FOOTPRINT_REACH)
+    offsets = window_offsets(SIDE)
     centre = np.clip(np.floor(around + 0.5).astype(np.int64), 0, limit)
     # Two entries overlap by a sum that depends on the offset between them alone.
-    steps = _square(2 * FOOTPRINT_REACH)
+    steps = window_offsets(2 * SIDE - 1)
     overlap = np.cos(2 * np.pi * (basis.cycles @ steps.T)).astype(np.float32)
     apart = offsets[:, None] - offsets[None] + 2 * FOOTPRINT_REACH
     number = apart[..., 0] * (4 * FOOTPRINT_REACH + 1) + apart[..., 1]
@@ -78,13 +80,12 @@ def entries_about(basis: RealBasis, weighed: Weighed, around: NDArray[np.float64
     scores = np.ascontiguousarray((phase_shifted @ basis.patterns_at(offsets)).T)
     gram = (overlap.T @ weighed.weights.T)[number]
     entries, explained = nonnegative_entries(scores, gram, inside, ridge)
-    side = 2 * FOOTPRINT_REACH + 1
     excess = np.sqrt(np.maximum(explained, 0.0) / basis.count)
     of_middle = np.abs(gram[len(gram) // 2])
     of_itself = np.maximum(of_middle[len(gram) // 2], np.finfo(np.float32).tiny)
     of_middle[len(gram) // 2] = 0.0
     alike = of_middle.max(axis=0) / of_itself
-    return Entries(entries.T.reshape(-1, side, side), centre, excess, alike)
+    return Entries(entries.T.reshape(-1, SIDE, SIDE), centre, excess, alike)
 
 
 def places_among(seen: Entries, around: NDArray[np.float64]) -> Floats:
@@ -102,8 +103,3 @@ def places_among(seen: Entries, around: NDArray[np.float64]) -> Floats:
     of_all = seen.middles + sums / np.where(total > 0, total, 1.0)[:, None]
     of_direct = centroids(seen.values, seen.middles, around)
     return np.where((seen.alike > LARGEST_ALIKE)[:, None], of_all, of_direct)
-
-
-def _square(reach: int) -> NDArray[np.int64]:
-    side = np.arange(-reach, reach + 1)
-    return np.stack(np.meshgrid(side, side, indexing="ij"), axis=-1).reshape(-1, 2)

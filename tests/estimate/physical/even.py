@@ -15,6 +15,7 @@ CAMERA = Size(13, 13)
 PROJECTOR = Size(19, 48)
 WINDOW = 7
 WHITE = np.ones(PROJECTOR, np.float32)
+EVERYWHERE = np.ones(CAMERA, bool)
 
 
 def places(*, gap=0, from_column=13):
@@ -83,3 +84,11 @@ def split_of(transport, *bodies):
     return PhysicalSplit(
         transport, transport.direct, bodies, nowhere(transport.channels), transport.footprint
     )
+
+
+def wax(direct, under, rest, *, explained, seen=EVERYWHERE):
+    """Return a split of a body, where it is seen, with components under white, each (Cy, Cx)."""
+    direct, under, rest = (np.broadcast_to(part, CAMERA) for part in (direct, under, rest))
+    q = places()
+    transport = transport_of(direct, np.where(seen, under, 0.0) + rest, q)
+    return split_of(transport, body_of(seen, q, under, explained))

@@ -6,23 +6,13 @@ import pytest
 from nearfar.estimate.physical.guided_direct import with_guided_direct_light
 from nearfar.estimate.physical.local_fits import guided_about, planes_about
 from nearfar.illumination.pictures import random_pattern
-from tests.estimate.physical.even import CAMERA, PROJECTOR, WHITE, body_of, places, split_of
-from tests.estimate.physical.even import transport_of as transport_with
+from tests.estimate.physical.even import CAMERA, EVERYWHERE, PROJECTOR, WHITE, wax
 
 DIRECT, UNDER, REST = 0.2, 0.3, 0.1
 Y, X = np.mgrid[: CAMERA.height, : CAMERA.width]
-EVERYWHERE = np.ones(CAMERA, bool)
 INNER = (slice(2, -2), slice(2, -2))
 # Of a body that kernels explain well, and badly.
 WELL, BADLY = 1.0, 0.7
-
-
-def wax(direct, under, rest, *, explained, seen=EVERYWHERE):
-    """Return a split of a body, where it is seen, with components under white, each (Cy, Cx)."""
-    direct, under, rest = (np.broadcast_to(part, CAMERA) for part in (direct, under, rest))
-    q = places()
-    transport = transport_with(direct, np.where(seen, under, 0.0) + rest, q)
-    return split_of(transport, body_of(seen, q, under, explained))
 
 
 def guided(split, deviation=0.0):

@@ -9,26 +9,15 @@ from tests.estimate.physical.even import (
     CAMERA,
     PROJECTOR,
     WHITE,
-    body_of,
     of_both_channels,
-    places,
     split_of,
-    transport_of,
+    wax,
 )
 
 DIRECT, UNDER, REST = 0.2, 0.3, 0.1
 Y, X = np.mgrid[: CAMERA.height, : CAMERA.width]
-EVERYWHERE = np.ones(CAMERA, bool)
 # Of a body that kernels explain well, and badly.
 WELL, BADLY = 1.0, 0.7
-
-
-def wax(direct, under, rest, *, explained, seen=EVERYWHERE):
-    """Return a split of a body, where it is seen, with components under white, each (Cy, Cx)."""
-    direct, under, rest = (np.broadcast_to(part, CAMERA) for part in (direct, under, rest))
-    q = places()
-    transport = transport_of(direct, np.where(seen, under, 0.0) + rest, q)
-    return split_of(transport, body_of(seen, q, under, explained))
 
 
 def smoothed(split, deviation=0.0):

@@ -8,15 +8,18 @@ The mean of these changes over the camera pixels around is taken off again: dark
 which are less sure, would gain direct light that no other one loses.
 """
 
-from dataclasses import replace
-
 import numpy as np
 from scipy import ndimage
 
 from nearfar.arrays import Booleans, Floats
-from nearfar.estimate.physical.local_fits import REACH, guided_about
-from nearfar.estimate.physical.smooth_bodies import TINY, variances_apart
-from nearfar.estimate.physical.split import DARK, PhysicalSplit, on_bodies, with_more_direct
+from nearfar.estimate.physical.local_fits import REACH, guided_about, share_of_noise
+from nearfar.estimate.physical.smooth_bodies import variances_apart
+from nearfar.estimate.physical.split import (
+    PhysicalSplit,
+    on_bodies,
+    with_more_direct,
+    with_more_subsurface,
+)
 
 # Camera pixels on bodies that a fit goes through, at least: twice as many as it has terms.
 LEAST_TELLING = 8
@@ -47,7 +50,6 @@ def with_guided_direct_light(split: PhysicalSplit, deviation: Floats) -> Physica
     pixels = np.flatnonzero(seen)
     white = np.ones(transport.projector, dtype=np.float32)
     parts = np.stack([np.reshape(part, shape) for part in split.components(white)])
-    direct, under = parts[0, pixels], parts[1, pixels]
     noise = np.minimum(*variances_apart(split, deviation, parts[1]))[pixels]
     fit = guided_about(
         parts[0].reshape(*transport.camera, -1),
@@ -55,23 +57,15 @@ def with_guided_direct_light(split: PhysicalSplit, deviation: Floats) -> Physica
         seen,
         pixels,
     )
-    apart = direct - fit.value
-    scatter = (fit.left + (apart**2).mean(axis=1)) / (fit.number + 1)
-    lost = np.minimum(APART * noise.mean(axis=1) / np.maximum(scatter, TINY), 1.0)
-    lost *= fit.number >= LEAST_TELLING
+    apart = parts[0, pixels] - fit.value
+    lost = share_of_noise(fit, apart, APART * noise.mean(axis=1), LEAST_TELLING)
     of_all = np.zeros(shape)
     of_all[pixels] = -lost[:, None] * apart
     of_all -= _mean_about(of_all.reshape(*seen.shape, -1), seen).reshape(shape)
     # Neither becomes negative.
-    change = np.clip(of_all[pixels], np.minimum(-direct, 0.0), np.maximum(under, 0.0))
-    of_all[pixels] = change
-    changed = with_more_direct(split, of_all.reshape(transport.direct.shape))
-    factor = np.ones(shape)
-    factor[pixels] = np.maximum(1 - change / np.maximum(under, DARK), 0.0)
-    bodies = (
-        body._replace(amplitude=body.amplitude * factor[body.pixels]) for body in changed.bodies
-    )
-    return replace(changed, bodies=tuple(bodies))
+    change = np.clip(of_all, np.minimum(-parts[0], 0.0), np.maximum(parts[1], 0.0))
+    split = with_more_subsurface(split, -change, parts[1])
+    return with_more_direct(split, change.reshape(transport.direct.shape))
 
 
 def _mean_about(values: Floats, seen: Booleans) -> Floats:

@@ -17,6 +17,7 @@ REACH = 2
 LEVEL = 0.5
 # Of a guide, as a share of its root mean square: differences as small as this tell little.
 TELLING_OF_GUIDE = 0.01
+TINY = float(np.finfo(np.float64).tiny)
 
 
 class LocalFit(NamedTuple):
@@ -73,6 +74,24 @@ def guided_about(values: Floats, guide: Floats, seen: Booleans, pixels: Integers
     LocalFit
     """
     return _fitted(values, seen, pixels, guide)
+
+
+def share_of_noise(fit: LocalFit, apart: Floats, noise: Floats, least_number: int) -> Floats:
+    """Return how much of what camera pixels deviate by from a fit is noise, shape (c,), 0 to 1.
+
+    Parameters
+    ----------
+    fit : LocalFit
+    apart : ndarray, shape (c, channels)
+        The camera pixels' own values less those of the fit.
+    noise : ndarray, shape (c,)
+        Variance of the noise, mean over channels.
+    least_number : int
+        Others that tell anything, at least.
+    """
+    scatter = (fit.left + (apart**2).mean(axis=1)) / (fit.number + 1)
+    share = np.minimum(noise / np.maximum(scatter, TINY), 1.0)
+    return np.asarray(share * (fit.number >= least_number))
 
 
 def _fitted(values: Floats, seen: Booleans, pixels: Integers, guide: Floats | None) -> LocalFit:

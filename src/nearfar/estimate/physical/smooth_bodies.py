@@ -8,8 +8,6 @@ goes to direct and subsurface light, as far as their error bars explain it.
 Index convention: c runs over camera pixels on bodies.
 """
 
-from dataclasses import replace
-
 import numpy as np
 
 from nearfar.arrays import Floats
@@ -19,8 +17,14 @@ from nearfar.estimate.physical.error_bars import (
     root_left,
     taken_by_boxes,
 )
-from nearfar.estimate.physical.local_fits import planes_about
-from nearfar.estimate.physical.split import DARK, PhysicalSplit, on_bodies, with_more_direct
+from nearfar.estimate.physical.local_fits import TINY, planes_about, share_of_noise
+from nearfar.estimate.physical.split import (
+    DARK,
+    PhysicalSplit,
+    on_bodies,
+    with_more_direct,
+    with_more_subsurface,
+)
 
 # Camera pixels on bodies that a plane goes through, at least.
 LEAST_TELLING = 6
@@ -35,7 +39,6 @@ CORRELATION = -0.65
 # Share of their variance that is taken off: errors of a kernel are much the same all over a body.
 # How these were chosen: docs/decisions/0110.
 APART = 0.2
-TINY = float(np.finfo(np.float64).tiny)
 
 
 def with_smooth_bodies(split: PhysicalSplit, deviation: Floats) -> PhysicalSplit:
@@ -66,19 +69,12 @@ def with_smooth_bodies(split: PhysicalSplit, deviation: Floats) -> PhysicalSplit
     share = parts[2] / total
     planes = planes_about(share.reshape(*transport.camera, -1), seen, pixels)
     apart = share[pixels] - planes.value
-    scatter = (planes.left + (apart**2).mean(axis=1)) / (planes.number + 1)
-    lost = np.minimum(APART * noise / np.maximum(scatter, TINY), 1.0)
-    lost *= planes.number >= LEAST_TELLING
+    lost = share_of_noise(planes, apart, APART * noise, LEAST_TELLING)
     change = np.zeros(shape)
     change[pixels] = lost[:, None] * apart * total[pixels]
     # Each of the two takes the more of it, the less sure it is.
     to_direct = of_direct / np.maximum(of_direct + of_under, TINY)
-    more_under = (1 - to_direct) * change / np.maximum(parts[1], DARK)
-    factor = np.maximum(1 + more_under, 0.0)
-    bodies = (
-        body._replace(amplitude=body.amplitude * factor[body.pixels]) for body in split.bodies
-    )
-    split = replace(split, bodies=tuple(bodies))
+    split = with_more_subsurface(split, (1 - to_direct) * change, parts[1])
     return with_more_direct(split, (to_direct * change).reshape(transport.direct.shape))
 
 

@@ -308,6 +308,26 @@ def with_more_direct(split: PhysicalSplit, change: Floats) -> PhysicalSplit:
     )
 
 
+def with_more_subsurface(split: PhysicalSplit, change: Floats, under: Floats) -> PhysicalSplit:
+    """Return a split with more subsurface light on bodies, and as much less inter-reflection.
+
+    Parameters
+    ----------
+    split : PhysicalSplit
+    change, under : ndarray, shape (C, channels)
+        Under white: how much more there is to be, and what there is. None becomes negative.
+
+    Returns
+    -------
+    PhysicalSplit
+    """
+    factor = np.maximum(1 + change / np.maximum(under, DARK), 0.0)
+    bodies = (
+        body._replace(amplitude=body.amplitude * factor[body.pixels]) for body in split.bodies
+    )
+    return replace(split, bodies=tuple(bodies))
+
+
 def _no_less(direct: Floats, change: Floats) -> Floats:
     """Return direct light with a change, which makes none negative."""
     return np.asarray(np.maximum(direct + change, np.minimum(direct, 0.0)))
